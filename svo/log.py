@@ -1,0 +1,59 @@
+"""Recorded or simulated data of a plant, one row a sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Log:
+    """Samples of one run; row k holds what is known of time ``time[k]``.
+
+    Attributes
+    ----------
+    time : (K,) array
+        Seconds, strictly increasing.
+    u : (K, nu) array
+        ``u[k]`` is held from sample k to sample k + 1.
+    y : (K, ny) array
+        Measurements; NaN marks a sensor that is missing at that sample.
+    x : (K, n) array, optional
+        True states, known in simulation only.
+    schedule : (K, ...) array, optional
+        Scheduling value at each sample; None for plants without one.
+    """
+
+    time: Array
+    u: Array
+    y: Array
+    x: Array | None = None
+    schedule: Array | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        time = np.asarray(self.time, dtype=float)
+        if time.ndim != 1:
+            raise ValueError(f"time has shape {time.shape}; expected one dimension, (K,)")
+        object.__setattr__(self, "time", time)
+        for name in ("u", "y", "x", "schedule"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = np.asarray(value, dtype=float)
+            if array.shape[:1] != time.shape or (name != "schedule" and array.ndim != 2):
+                raise ValueError(f"{name} has shape {array.shape}; expected ({time.size}, channels), one row a sample of time")
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    def schedule_at(self, k: int) -> float | Array | None:
+        """Scheduling value of sample k, or None where the log has none."""
+        if self.schedule is None:
+            return None
+        value = self.schedule[k]
+        return float(value) if value.ndim == 0 else value

@@ -1,0 +1,62 @@
+"""What every observer answers at a sample."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+
+Array = NDArray[np.float64]
+VerdictName = Literal["consistent", "falsified", "undecided"]
+
+
+class Step(Protocol):
+    """The answer of an observer at one sample.
+
+    Attributes
+    ----------
+    verdict : {"consistent", "falsified", "undecided"}
+        "falsified" only with a certificate that has been checked in exact arithmetic.
+    certificate : object with ``verify()``, or None
+    seconds : float
+        Wall time of the call.
+    box : (lower, upper)
+        Bounds of the current state; NaN once the model is falsified.
+    set : HPolytope
+        The template set of the current state; empty once the model is falsified.
+    """
+
+    verdict: VerdictName
+    certificate: Any
+    seconds: float
+
+    @property
+    def box(self) -> tuple[Array, Array]: ...
+
+    @property
+    def set(self) -> HPolytope: ...
+
+
+class Observer(Protocol):
+    """The protocol that isolation banks use; every observer of the package has it."""
+
+    model: Any
+
+    def update(self, y0: Any, u: Any = None, schedule: Any = None) -> Step:
+        """A measurement without a transition (the first one)."""
+        ...
+
+    def step(self, u: Any, y: Any, u_next: Any = None, schedule: Any = None) -> Step:
+        """One transition driven by u, then the measurement y."""
+        ...
+
+    def reset(self, set: HPolytope) -> None:
+        """Forget all data and start again from a set of states."""
+        ...
+
+    def warm_up(self) -> float:
+        """Compile whatever a step needs; returns the seconds that it took."""
+        ...

@@ -1,0 +1,124 @@
+"""The protocol behind the entry points of the group ``svo.plants``.
+
+A study, the command line and a report know a plant only through these names, so a user's own plant
+registers exactly as the ones that ship: an object that satisfies :class:`Plant`, named in the entry
+points of its distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.isolation.architectures import ArchitectureI
+from svo.log import Log
+
+HEALTHY = "none"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One channel of a log file: its column name and the unit of the numbers in it."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Column names of a log: time in seconds, then the channels in the model's order and units."""
+
+    inputs: tuple[Column, ...]
+    outputs: tuple[Column, ...]
+    states: tuple[Column, ...] = ()
+    time: str = "time_s"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a paper reports for one fault and profile, as it is to be printed (seconds; "-" where silent)."""
+
+    detect: str
+    isolate: str
+
+
+@runtime_checkable
+class Plant(Protocol):
+    """What a study needs to know of a plant.
+
+    Attributes
+    ----------
+    name, title : str
+        The key in the registry, and one line for people.
+    Ts : float
+        Sampling time [s].
+    fault_time : float
+        Time of the first faulty sample [s].
+    faults : mapping of str to tuple of str
+        Fault names and, for each, its profiles ("step", "hard", "soft").
+    noise_sets : tuple of str
+        Names of the noise and disturbance bounds; the first is the default.
+    columns : Columns
+        Names and units of the channels of a log file.
+    reference : mapping of (fault, profile) to Reference
+        The paper's figures, printed beside ours; may be empty.
+    reference_title : str
+        Where those figures come from.
+    """
+
+    name: str
+    title: str
+    Ts: float
+    fault_time: float
+    faults: Mapping[str, tuple[str, ...]]
+    noise_sets: tuple[str, ...]
+    columns: Columns
+    reference: Mapping[tuple[str, str], Reference]
+    reference_title: str
+
+    def duration(self, fault: str, profile: str) -> float:
+        """Length of a run [s]; ``fault`` may be "none"."""
+        ...
+
+    def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
+        """One run with its true states; ``fault`` may be "none". The log carries the schedule of `scheduler`."""
+        ...
+
+    def bank(self, noise: str) -> ArchitectureI:
+        """A fresh isolation bank; its fault observers are named as in `faults`."""
+        ...
+
+    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+        """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
+        ...
+
+
+def registered_plants() -> dict[str, Callable[[], Plant]]:
+    """Loaders of the plants that installed distributions register, by name."""
+    return {point.name: point.load for point in sorted(entry_points(group="svo.plants"), key=lambda p: p.name)}
+
+
+def load_plant(name: str) -> Plant:
+    """The registered plant of that name.
+
+    Raises
+    ------
+    ValueError
+        If no plant of that name is registered; the message lists those that are.
+    TypeError
+        If the entry point does not return a `Plant`.
+    """
+    loaders = registered_plants()
+    if name not in loaders:
+        known = ", ".join(loaders) or "none"
+        raise ValueError(f"no plant is registered as {name!r} in the entry-point group svo.plants; registered: {known}")
+    factory: Any = loaders[name]()
+    plant = factory() if callable(factory) and not isinstance(factory, Plant) else factory
+    if not isinstance(plant, Plant):
+        raise TypeError(f"entry point {name!r} of group svo.plants gave {type(plant).__name__}, which is not a Plant")
+    return plant
