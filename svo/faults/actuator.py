@@ -1,0 +1,293 @@
+"""Actuator faults (Marzat et al. 2012, equation (18) and Table 3; Rosa and Silvestre 2013, Table 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from svo.faults.blocks import (
+    channels,
+    check_channels,
+    only_columns,
+    product_of,
+    sum_of_columns,
+    with_new_columns,
+    with_new_disturbances,
+    without_columns,
+)
+from svo.faults.profiles import Profile, Step
+from svo.model import UncertainModel, Uncertainty
+
+Array = NDArray[np.float64]
+ActuatorKind = Literal["loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid"]
+
+_NEEDS_TRAVEL = ("locking", "runaway")
+_NEEDS_FREQUENCY = ("oscillatory-solid", "oscillatory-liquid")
+_WITHOUT_MAGNITUDE = ("locking", "floating")
+
+
+@dataclass(frozen=True)
+class ActuatorLaw:
+    """The achieved deflection of a faulty actuator at given times, from the command and the deflection held.
+
+    achieved = clip(gain command + hold held + offset, lower, upper), where ``held`` is the deflection
+    that was achieved when the fault began. All arrays have the shape of the times.
+    """
+
+    gain: Array
+    hold: Array
+    offset: Array
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True)
+class ActuatorFault:
+    """A fault of one actuator, or of several that fail together. Inputs are ABSOLUTE (trim included).
+
+    With u the command, p = profile.value(t), h the deflection achieved when the fault began, and
+    m = magnitude, the achieved deflection is
+
+    ==================  ===============================  ==================================================
+    kind                achieved                         what ``model`` contains
+    ==================  ===============================  ==================================================
+    loss                (1 - m p) u, 0 < m <= 1          (1 - Delta) u, any Delta in [0, m]
+    floating            (1 - p) u                        (1 - Delta) u, any Delta in [0, 1]
+    hard-over           (1 - p) u + p m                  (1 - Delta) u + Delta m, any Delta in [0, 1]
+    oscillatory-solid   (1 - p) u + p m sin(2 pi f t')   (1 - Delta) u + Delta v, Delta in [0, 1], |v| <= m
+    oscillatory-liquid  u + p m sin(2 pi f t')           u + v, any |v| <= m
+    locking             (1 - p) u + p h                  any deflection within the travel
+    runaway             h + m t', stopped at the travel  any deflection within the travel
+    ==================  ===============================  ==================================================
+
+    where t' is the time since the start. Delta and v are free to change at each sample. Every model
+    contains the healthy actuator; those of locking and runaway do so for commands within the travel (a
+    command beyond it is one that no healthy actuator follows). A fault that scales or replaces the
+    command adds one Uncertainty (after the nominal ones) whose Delta at a time is ``delta(t)``; if the
+    nominal B or D is itself uncertain, each product Delta_i Delta becomes one more free Delta, which
+    contains it. Unknown deflections v are disturbances, last in w, one a channel.
+
+    Parameters
+    ----------
+    where : int or tuple of int
+        Input channels; several share one Delta.
+    kind : {"loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid"}
+    magnitude : float or None
+        Lost fraction (loss), deflection reached (hard-over), rate per second (runaway), amplitude > 0
+        (oscillatory); None for locking and floating.
+    profile : Profile
+        Shape in time. A runaway has a shape of its own and takes a `Step`.
+    travel : (lower, upper), optional
+        Limits of the deflection, needed by locking and runaway.
+    frequency_hz : float, optional
+        Needed by the oscillatory kinds.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument that is missing, out of range, or has no meaning for this kind.
+    """
+
+    where: int | tuple[int, ...]
+    kind: ActuatorKind
+    magnitude: float | None
+    profile: Profile
+    travel: tuple[float, float] | None = None
+    frequency_hz: float | None = None
+
+    def __post_init__(self) -> None:
+        channels(self.where)
+        if self.kind not in get_args(ActuatorKind):
+            raise ValueError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(ActuatorKind))}")
+        self._check_magnitude()
+        self._check_given("travel", _NEEDS_TRAVEL)
+        self._check_given("frequency_hz", _NEEDS_FREQUENCY)
+        if self.travel is not None:
+            lower, upper = self.travel
+            if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+                raise ValueError(f"travel is {self.travel}; expected finite (lower, upper) with lower < upper")
+        if self.frequency_hz is not None and not (np.isfinite(self.frequency_hz) and self.frequency_hz > 0):
+            raise ValueError(f"frequency_hz is {self.frequency_hz}; expected a positive number")
+        if self.kind == "runaway" and not isinstance(self.profile, Step):
+            raise ValueError(f"profile is {self.profile}; a runaway moves at its own rate, so give it a Step")
+
+    # -- simulation ------------------------------------------------------------------------------
+
+    def delta(self, t: ArrayLike) -> Array:
+        """Delta that the fault has at time t [s] in its own model: the fraction of the command lost or replaced."""
+        p = self.profile.value(t)
+        return self._size * p if self.kind == "loss" else p
+
+    def law(self, t: ArrayLike) -> ActuatorLaw:
+        """The law at times t [s], each array of the shape of t; for simulators that precompute it."""
+        p = self.profile.value(t)
+        zero, free = np.zeros_like(p), np.full_like(p, np.inf)
+        gain, hold, offset, lower, upper = 1.0 - p, zero, zero, -free, free
+        if self.kind == "loss":
+            gain = 1.0 - self.delta(t)
+        elif self.kind == "hard-over":
+            offset = p * self._size
+        elif self.kind == "locking":
+            hold = p
+        elif self.kind == "runaway":
+            assert self.travel is not None
+            hold, offset = p, p * self._size * self._elapsed(t)
+            lower, upper = (np.where(p > 0, limit, end) for limit, end in zip(self.travel, (lower, upper), strict=True))
+        elif self.kind in _NEEDS_FREQUENCY:
+            assert self.frequency_hz is not None
+            offset = p * self._size * np.sin(2.0 * np.pi * self.frequency_hz * self._elapsed(t))
+            gain = gain if self.kind == "oscillatory-solid" else np.ones_like(p)
+        return ActuatorLaw(gain=gain, hold=hold, offset=offset, lower=lower, upper=upper)
+
+    def corrupt(self, t: ArrayLike, u: ArrayLike, held: ArrayLike | None = None) -> Array:
+        """Achieved deflections from commands.
+
+        Parameters
+        ----------
+        t : float or (K,) array
+            Time [s], increasing.
+        u : (nu,) or (K, nu) array
+            Commands.
+        held : (nu,) array, optional
+            Deflections achieved when the fault began, needed by locking and runaway. For a whole run
+            (K, nu) it may be left out: the last command before the first faulty sample is taken (the
+            first command, if the run starts faulty).
+
+        Returns
+        -------
+        array of the shape of u
+        """
+        commands = np.array(u, dtype=float)
+        where = channels(self.where)
+        check_channels(where, commands.shape[-1], "channels in u")
+        law = self.law(t)
+        kept = self._held(t, commands, held)
+        for channel in where:
+            moved = law.gain * commands[..., channel] + law.hold * kept[channel] + law.offset
+            commands[..., channel] = np.clip(moved, law.lower, law.upper)
+        return commands
+
+    def _held(self, t: ArrayLike, commands: Array, held: ArrayLike | None) -> Array:
+        if self.kind not in _NEEDS_TRAVEL:
+            return np.zeros(commands.shape[-1])
+        if held is not None:
+            kept = np.asarray(held, dtype=float)
+            if kept.shape != commands.shape[-1:]:
+                expected = commands.shape[-1:]
+                raise ValueError(f"held has shape {kept.shape}; expected {expected}, one deflection an input")
+            return kept
+        if commands.ndim == 1:
+            raise ValueError(f"held is missing: a {self.kind} needs the deflection achieved when the fault began")
+        faulty = np.flatnonzero(self.profile.value(t) > 0)
+        return commands[max(int(faulty[0]) - 1, 0)] if faulty.size else np.zeros(commands.shape[-1])
+
+    def _elapsed(self, t: ArrayLike) -> Array:
+        return np.maximum(np.asarray(t, dtype=float) - self.profile.start, 0.0)
+
+    # -- the observer's model ----------------------------------------------------------------------
+
+    def model(self, nominal: UncertainModel) -> UncertainModel:
+        """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+        check_channels(channels(self.where), nominal.n_inputs, "inputs in the model")
+        if self.kind in _NEEDS_TRAVEL:
+            assert self.travel is not None
+            return self._with_unknown_input(nominal, *self.travel, keep_command=False)
+        if self.kind == "oscillatory-liquid":
+            return self._with_unknown_input(nominal, -self._size, self._size, keep_command=True)
+        if self.kind == "oscillatory-solid":
+            return self._with_replaced_command(self._with_idle_disturbance(nominal), nominal.n_disturbances)
+        return self._with_replaced_command(nominal, None)
+
+    def _with_unknown_input(
+        self, nominal: UncertainModel, lower: float, upper: float, *, keep_command: bool
+    ) -> UncertainModel:
+        """The command of these channels, kept or dropped, plus an unknown input in [lower, upper]."""
+        where, nw = channels(self.where), nominal.n_disturbances
+
+        def blocks(owner: UncertainModel | Uncertainty) -> dict[str, Any]:
+            changed: dict[str, Any] = {
+                "E": with_new_columns(owner.E, owner.B, where, nw),
+                "F": with_new_columns(owner.F, owner.D, where, nw),
+            }
+            if not keep_command:
+                changed |= {"B": without_columns(owner.B, where), "D": without_columns(owner.D, where)}
+            return changed
+
+        return nominal.replace(
+            **blocks(nominal),
+            w=with_new_disturbances(nominal, lower, upper, len(where)),
+            uncertainties=[replace(u, **blocks(u)) for u in nominal.uncertainties],
+            names=self._names(nominal),
+        )
+
+    def _with_idle_disturbance(self, nominal: UncertainModel) -> UncertainModel:
+        """The nominal model with the oscillation appended to w, entering nowhere yet."""
+        where, nw = channels(self.where), nominal.n_disturbances
+        idle = only_columns(nominal.B, (), 0.0)
+        return nominal.replace(
+            E=with_new_columns(nominal.E, idle, where, nw),
+            F=with_new_columns(nominal.F, None, where, nw),
+            w=with_new_disturbances(nominal, -self._size, self._size, len(where)),
+            uncertainties=[
+                replace(u, E=with_new_columns(u.E, None, where, nw), F=with_new_columns(u.F, None, where, nw))
+                for u in nominal.uncertainties
+            ],
+            names=self._names(nominal),
+        )
+
+    def _with_replaced_command(self, nominal: UncertainModel, target_column: int | None) -> UncertainModel:
+        """Delta (target - u) added to the command, the target being a constant or w from ``target_column`` on."""
+        where = channels(self.where)
+        bounds = (0.0, self._size if self.kind == "loss" else 1.0)
+
+        def blocks(owner: UncertainModel | Uncertainty) -> dict[str, Any]:
+            changed: dict[str, Any] = {name: only_columns(getattr(owner, name), where, -1.0) for name in "BD"}
+            if self.kind == "hard-over":
+                changed["a"] = sum_of_columns(owner.B, where, self._size)
+                changed["c"] = sum_of_columns(owner.D, where, self._size)
+            if target_column is not None:
+                changed |= {
+                    "E": with_new_columns(None, owner.B, where, target_column),
+                    "F": with_new_columns(None, owner.D, where, target_column),
+                }
+            return changed
+
+        fault = Uncertainty(**blocks(nominal), bounds=bounds, name=f"{self.kind} of actuator {self.where}")
+        products = [product_of(u, bounds, self.kind, **blocks(u)) for u in nominal.uncertainties]
+        return nominal.replace(uncertainties=[*nominal.uncertainties, fault, *(p for p in products if p is not None)])
+
+    def _names(self, nominal: UncertainModel) -> dict[str, list[str]] | None:
+        if nominal.names is None or "disturbances" not in nominal.names:
+            return None if nominal.names is None else {k: list(v) for k, v in nominal.names.items()}
+        new = [f"{self.kind} of input {channel}" for channel in channels(self.where)]
+        return {k: [*v, *new] if k == "disturbances" else list(v) for k, v in nominal.names.items()}
+
+    # -- validation ------------------------------------------------------------------------------
+
+    @property
+    def _size(self) -> float:
+        assert self.magnitude is not None
+        return self.magnitude
+
+    def _check_magnitude(self) -> None:
+        if self.kind in _WITHOUT_MAGNITUDE:
+            if self.magnitude is not None:
+                raise ValueError(f"magnitude is {self.magnitude} but {self.kind} has none; give None")
+            return
+        if self.magnitude is None or not np.isfinite(self.magnitude):
+            raise ValueError(f"magnitude is {self.magnitude}; {self.kind} needs a finite number")
+        if self.kind == "loss" and not 0 < self.magnitude <= 1:
+            raise ValueError(f"magnitude is {self.magnitude}; expected the lost fraction, 0 < magnitude <= 1")
+        if self.kind in _NEEDS_FREQUENCY and self.magnitude <= 0:
+            raise ValueError(f"magnitude is {self.magnitude}; expected an amplitude > 0")
+        if self.kind == "runaway" and self.magnitude == 0:
+            raise ValueError("magnitude is 0; expected the rate of the runaway per second (use locking for none)")
+
+    def _check_given(self, name: str, kinds: tuple[str, ...]) -> None:
+        given = getattr(self, name) is not None
+        if given != (self.kind in kinds):
+            wanted = "takes none" if given else "needs one"
+            raise ValueError(f"{name} is {getattr(self, name)}; {self.kind} {wanted}")

@@ -1,0 +1,115 @@
+"""Arithmetic on model arrays that may be constant, functions of the schedule, or absent (zero)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo.model import Schedulable, UncertainModel, Uncertainty
+
+Array = NDArray[np.float64]
+
+
+def mapped(function: Callable[..., Array], *values: Schedulable) -> Schedulable:
+    """``function`` of arrays; again a function of the schedule where any of them is one."""
+    if not any(callable(v) for v in values):
+        return function(*(np.asarray(v, dtype=float) for v in values))
+
+    def at(schedule: Any) -> Array:
+        return function(*(np.asarray(v(schedule) if callable(v) else v, dtype=float) for v in values))
+
+    return at
+
+
+def only_columns(value: Schedulable, columns: Sequence[int], factor: float) -> Schedulable:
+    """The array with all columns zero but these, which are multiplied by ``factor``."""
+    return None if value is None else mapped(lambda m: m * _mask(m.shape[1], columns, factor), value)
+
+
+def without_columns(value: Schedulable, columns: Sequence[int]) -> Schedulable:
+    """The array with these columns set to zero."""
+    return None if value is None else mapped(lambda m: m * (1.0 - _mask(m.shape[1], columns, 1.0)), value)
+
+
+def only_rows(value: Schedulable, rows: Sequence[int], factor: float) -> Schedulable:
+    """The array (matrix or vector) with all rows zero but these, which are multiplied by ``factor``."""
+    return None if value is None else mapped(lambda m: (m.T * _mask(len(m), rows, factor)).T, value)
+
+
+def sum_of_columns(value: Schedulable, columns: Sequence[int], factor: float) -> Schedulable:
+    """``factor`` times the sum of these columns, a vector."""
+    return None if value is None else mapped(lambda m: factor * m[:, list(columns)].sum(axis=1), value)
+
+
+def with_new_columns(value: Schedulable, source: Schedulable, columns: Sequence[int], width: int) -> Schedulable:
+    """``value`` (``width`` columns, zero if absent) followed by these columns of ``source``; absent if both are."""
+    if source is None:
+        return None if value is None else mapped(lambda m: np.hstack([m, np.zeros((len(m), len(columns)))]), value)
+    if value is None:
+        return mapped(lambda s: np.hstack([np.zeros((len(s), width)), s[:, list(columns)]]), source)
+    return mapped(lambda m, s: np.hstack([m, s[:, list(columns)]]), value, source)
+
+
+def with_new_disturbances(model: UncertainModel, lower: float, upper: float, count: int) -> Any:
+    """The disturbance set of ``model`` times ``count`` intervals [lower, upper], as the argument ``w``."""
+    low, high = np.full(count, lower), np.full(count, upper)
+    if isinstance(model.w, HPolytope):
+        return model.w.product(HPolytope.box(low, high))
+    if isinstance(model.w, tuple) and any(callable(b) for b in model.w):
+        return (
+            lambda schedule: np.concatenate([model.bounds(schedule)[0], low]),
+            lambda schedule: np.concatenate([model.bounds(schedule)[1], high]),
+        )
+    known = model.bounds(model.schedule)
+    return np.concatenate([known[0], low]), np.concatenate([known[1], high])
+
+
+def with_noise(model: UncertainModel, function: Callable[[Array], Array]) -> Schedulable:
+    """``function`` of the noise half-widths (ny,) of ``model``, as the argument ``n``."""
+    return mapped(function, model.n if callable(model.n) else model.bounds(model.schedule)[2])
+
+
+def product_bounds(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
+    """Interval of the product of two numbers in the given intervals."""
+    corners = [a * b for a in first for b in second]
+    return min(corners), max(corners)
+
+
+def product_of(
+    uncertainty: Uncertainty, bounds: tuple[float, float], name: str, **blocks: Schedulable
+) -> Uncertainty | None:
+    """The term Delta_i Delta_fault of a fault that scales ``blocks`` of an uncertain nominal model.
+
+    The product is taken as one more free Delta, which contains it. None where no block is there to scale.
+    """
+    if all(v is None or (not callable(v) and not np.any(v)) for v in blocks.values()):
+        return None
+    label = f"{uncertainty.name or 'uncertainty'} x {name}"
+    return Uncertainty(**blocks, bounds=product_bounds(uncertainty.bounds, bounds), name=label)
+
+
+def channels(where: Any) -> tuple[int, ...]:
+    """``where`` of a fault as a tuple of indices, checked."""
+    indices = where if isinstance(where, tuple) else (where,)
+    for index in indices:
+        if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or index < 0:
+            raise ValueError(f"where is {where!r}; expected the index of a channel (>= 0) or a tuple of such indices")
+    if not indices or len(set(indices)) != len(indices):
+        raise ValueError(f"where is {where!r}; expected at least one channel, each once")
+    return tuple(int(i) for i in indices)
+
+
+def check_channels(where: Sequence[int], count: int, what: str) -> None:
+    """Refuse indices that the model or vector does not have."""
+    if max(where) >= count:
+        raise ValueError(f"where is {tuple(where)} but there are {count} {what}; expected indices below {count}")
+
+
+def _mask(size: int, indices: Sequence[int], factor: float) -> Array:
+    mask = np.zeros(size)
+    mask[list(indices)] = factor
+    return mask

@@ -1,0 +1,78 @@
+"""Faults of the dynamics: an uncertain direction of the model with a size (Rosa and Silvestre 2013, section 4.3.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from svo.faults.profiles import Profile
+from svo.model import UncertainModel, Uncertainty
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlantFault:
+    """A change of the plant along given directions.
+
+    At time t the plant gains delta(t) (A_i x + B_i u + a_i + E_i w) in its state equation and
+    delta(t) (C_i x + D_i u + c_i + F_i w) in its output, with delta(t) = magnitude profile.value(t).
+    The observer's model lets that Delta be anything between 0 and ``magnitude``, free to change at each
+    sample; so it contains the nominal plant and every intermediate size. It is the last Uncertainty.
+
+    Parameters
+    ----------
+    direction : Uncertainty
+        Where the fault acts, and how strongly at size one. Its own ``bounds`` are replaced.
+    magnitude : float
+        Delta of the full fault, not zero.
+    profile : Profile
+        Shape in time.
+    """
+
+    direction: Uncertainty
+    magnitude: float
+    profile: Profile
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.direction, Uncertainty):
+            raise TypeError(f"direction is a {type(self.direction).__name__}; expected an Uncertainty")
+        if not np.isfinite(self.magnitude) or self.magnitude == 0:
+            raise ValueError(f"magnitude is {self.magnitude}; expected a finite number, not zero")
+
+    def delta(self, t: ArrayLike) -> Array:
+        """Delta of the fault at times t [s], of the shape of t."""
+        return self.magnitude * self.profile.value(t)
+
+    def model(self, nominal: UncertainModel) -> UncertainModel:
+        """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+        bounds = (min(0.0, self.magnitude), max(0.0, self.magnitude))
+        named = replace(self.direction, bounds=bounds, name=self.direction.name or "plant fault")
+        return nominal.replace(uncertainties=[*nominal.uncertainties, named])
+
+    def perturbation(
+        self, nominal: UncertainModel, t: float, x: ArrayLike, u: ArrayLike, w: ArrayLike, schedule: Any = None
+    ) -> tuple[Array, Array]:
+        """What the fault adds to x(k+1) (n,) and to y(k) (ny,) at time t [s] of sample k.
+
+        Parameters
+        ----------
+        nominal : UncertainModel
+            The plant that is faulty.
+        x, u, w : (n,), (nu,), (nw,) arrays
+            State, input and disturbance of sample k; zero-length where the model has none.
+        schedule : optional
+            Scheduling value of sample k.
+        """
+        total = np.zeros(nominal.layout.shape)
+        for name in "ABaECDcF":
+            value = getattr(self.direction, name)
+            if value is not None:
+                rows, columns = nominal.layout.block(name)
+                block = np.asarray(value(schedule) if callable(value) else value, dtype=float)
+                total[rows, columns] = block[:, None] if block.ndim == 1 else block
+        change = float(self.delta(t)) * (total @ np.concatenate([x, u, [1.0], w]))
+        return change[: nominal.n_states], change[nominal.n_states :]

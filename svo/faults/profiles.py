@@ -1,0 +1,117 @@
+"""Shapes of a fault in time: abrupt, incipient, intermittent (Marzat et al. 2012, section 2.2).
+
+A profile is the fraction of the fault's magnitude that is present at a time. Times are in seconds.
+A sample that is meant to fall on an edge is taken as on it: sample times such as 57 * 0.01 differ
+from the written 0.57 in the last digit, and the first faulty sample must not depend on that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+EDGE_TOLERANCE_S = 1e-9
+
+
+@runtime_checkable
+class Profile(Protocol):
+    """A shape in time: zero before ``start``, and in [0, 1] from then on."""
+
+    @property
+    def start(self) -> float:
+        """Time of the first faulty sample [s]."""
+        ...
+
+    def value(self, t: ArrayLike) -> Array:
+        """Fraction of the magnitude present at time t [s]; same shape as t, one value in [0, 1] each."""
+        ...
+
+
+@dataclass(frozen=True)
+class Step:
+    """Abrupt fault: 0 before ``start`` [s], 1 from it on."""
+
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_finite("start", self.start)
+
+    def value(self, t: ArrayLike) -> Array:
+        """Fraction present at time t [s], of the shape of t."""
+        return _started(_elapsed(t, self.start)).astype(float)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Incipient fault: grows linearly from 0 at ``start`` [s] to 1 after ``duration`` [s], then stays."""
+
+    start: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        _check_finite("start", self.start)
+        _check_positive("duration", self.duration)
+
+    def value(self, t: ArrayLike) -> Array:
+        """Fraction present at time t [s], of the shape of t."""
+        return np.clip(_elapsed(t, self.start) / self.duration, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Exponential:
+    """Incipient fault: 1 - exp(-(t - start) / time_constant), both in seconds."""
+
+    start: float
+    time_constant: float
+
+    def __post_init__(self) -> None:
+        _check_finite("start", self.start)
+        _check_positive("time_constant", self.time_constant)
+
+    def value(self, t: ArrayLike) -> Array:
+        """Fraction present at time t [s], of the shape of t."""
+        return -np.expm1(-np.maximum(_elapsed(t, self.start), 0.0) / self.time_constant)
+
+
+@dataclass(frozen=True)
+class Intermittent:
+    """On for the first ``duty`` (0 < duty < 1) of every ``period`` [s] from ``start`` [s] on, off otherwise."""
+
+    start: float
+    period: float
+    duty: float = 0.5
+
+    def __post_init__(self) -> None:
+        _check_finite("start", self.start)
+        _check_positive("period", self.period)
+        if not 0 < self.duty < 1:
+            raise ValueError(f"duty is {self.duty}; expected a fraction of the period strictly between 0 and 1")
+
+    def value(self, t: ArrayLike) -> Array:
+        """Fraction present at time t [s], of the shape of t."""
+        elapsed = _elapsed(t, self.start)
+        phase = np.mod(elapsed + EDGE_TOLERANCE_S, self.period)
+        return (_started(elapsed) & (phase < self.duty * self.period)).astype(float)
+
+
+def _elapsed(t: ArrayLike, start: float) -> Array:
+    return np.asarray(t, dtype=float) - start
+
+
+def _started(elapsed: Array) -> NDArray[np.bool_]:
+    return np.asarray(elapsed >= -EDGE_TOLERANCE_S)
+
+
+def _check_finite(name: str, value: float) -> None:
+    if not np.isfinite(value):
+        raise ValueError(f"{name} is {value}; expected a finite time in seconds")
+
+
+def _check_positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0):
+        raise ValueError(f"{name} is {value}; expected a positive time in seconds")

@@ -1,0 +1,147 @@
+"""Sensor faults (Marzat et al. 2012, equation (17) and Table 2; Rosa and Silvestre 2013, Table 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from svo.faults.blocks import channels, check_channels, mapped, only_rows, product_of, with_noise
+from svo.faults.profiles import Profile
+from svo.model import Schedulable, UncertainModel, Uncertainty
+
+Array = NDArray[np.float64]
+SensorKind = Literal["bias", "drift", "scaling", "hard"]
+
+
+@dataclass(frozen=True)
+class SensorLaw:
+    """The reading of a faulty sensor at given times: ``gain`` times the healthy reading plus ``offset``."""
+
+    gain: Array
+    offset: Array
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """A fault of one sensor, or of several that fail together.
+
+    With y0 the healthy reading (noise included) and p = profile.value(t) the faulty one is
+
+    =========  =============================  =======================================================
+    kind       reading                        what ``model`` contains
+    =========  =============================  =======================================================
+    bias       y0 + magnitude p               any additive error of size up to |magnitude|, either sign,
+                                              free to change at each sample (wider noise)
+    drift      y0 + magnitude p               the same; ``magnitude`` is the error finally reached
+    scaling    (1 + magnitude p) y0           (1 + Delta) y0, any Delta between 0 and ``magnitude``
+    hard       (1 - p) y0 + magnitude p       (1 - Delta) y0 + Delta magnitude, any Delta in [0, 1]
+    =========  =============================  =======================================================
+
+    Every model contains the healthy sensor. Scaling and hard faults add one Uncertainty (after the
+    nominal ones) whose Delta at a time is ``delta(t)``; if the nominal output is itself uncertain, each
+    product Delta_i Delta becomes one more free Delta, which contains it.
+
+    Parameters
+    ----------
+    where : int or tuple of int
+        Output channels; several share one Delta.
+    kind : {"bias", "drift", "scaling", "hard"}
+    magnitude : float
+        Size of the full fault, in the unit of the output (for scaling: the relative gain error).
+    profile : Profile
+        Shape in time.
+
+    Raises
+    ------
+    ValueError
+        For a bad ``where``, an unknown kind, a magnitude that is not finite, or zero where that is no fault.
+    """
+
+    where: int | tuple[int, ...]
+    kind: SensorKind
+    magnitude: float
+    profile: Profile
+
+    def __post_init__(self) -> None:
+        channels(self.where)
+        if self.kind not in get_args(SensorKind):
+            raise ValueError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(SensorKind))}")
+        if not np.isfinite(self.magnitude) or (self.magnitude == 0 and self.kind != "hard"):
+            raise ValueError(f"magnitude of the {self.kind} is {self.magnitude}; expected a finite number, not zero")
+
+    def delta(self, t: ArrayLike) -> Array:
+        """Delta that the fault has at time t [s] in its own model; for bias and drift the additive error."""
+        p = self.profile.value(t)
+        return p if self.kind == "hard" else self.magnitude * p
+
+    def law(self, t: ArrayLike) -> SensorLaw:
+        """Gain and offset at times t [s], each of the shape of t; for simulators that precompute them."""
+        delta = self.delta(t)
+        if self.kind == "scaling":
+            return SensorLaw(gain=1.0 + delta, offset=np.zeros_like(delta))
+        if self.kind == "hard":
+            return SensorLaw(gain=1.0 - delta, offset=self.magnitude * delta)
+        return SensorLaw(gain=np.ones_like(delta), offset=delta)
+
+    def corrupt(self, t: ArrayLike, y: ArrayLike) -> Array:
+        """Faulty readings from healthy ones.
+
+        Parameters
+        ----------
+        t : float or (K,) array
+            Time [s].
+        y : (ny,) or (K, ny) array
+            Healthy readings; NaN (a missing sensor) stays NaN.
+
+        Returns
+        -------
+        array of the shape of y
+        """
+        readings = np.array(y, dtype=float)
+        where = channels(self.where)
+        check_channels(where, readings.shape[-1], "channels in y")
+        law = self.law(t)
+        for channel in where:
+            readings[..., channel] = law.gain * readings[..., channel] + law.offset
+        return readings
+
+    def model(self, nominal: UncertainModel) -> UncertainModel:
+        """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+        where = channels(self.where)
+        check_channels(where, nominal.n_outputs, "outputs in the model")
+        if self.kind in ("bias", "drift"):
+            return nominal.replace(n=self._wider_noise(nominal, gain=1.0, offset=abs(self.magnitude)))
+        uncertainties = [*nominal.uncertainties, self._scaling(nominal), *self._products(nominal)]
+        gain = max(1.0, abs(1.0 + self.magnitude)) if self.kind == "scaling" else 1.0
+        return nominal.replace(uncertainties=uncertainties, n=self._wider_noise(nominal, gain=gain, offset=0.0))
+
+    @property
+    def _bounds(self) -> tuple[float, float]:
+        return (0.0, 1.0) if self.kind == "hard" else (min(0.0, self.magnitude), max(0.0, self.magnitude))
+
+    @property
+    def _factor(self) -> float:
+        return -1.0 if self.kind == "hard" else 1.0
+
+    def _scaling(self, nominal: UncertainModel) -> Uncertainty:
+        rows = {name: only_rows(getattr(nominal, name), channels(self.where), self._factor) for name in "CDcF"}
+        if self.kind == "hard":
+            target = np.zeros(nominal.n_outputs)
+            target[list(channels(self.where))] = self.magnitude
+            rows["c"] = target if rows["c"] is None else mapped(np.add, rows["c"], target)
+        return Uncertainty(**rows, bounds=self._bounds, name=f"{self.kind} of sensor {self.where}")
+
+    def _products(self, nominal: UncertainModel) -> list[Uncertainty]:
+        products = []
+        for uncertainty in nominal.uncertainties:
+            rows = {name: only_rows(getattr(uncertainty, name), channels(self.where), self._factor) for name in "CDcF"}
+            products.append(product_of(uncertainty, self._bounds, self.kind, **rows))
+        return [p for p in products if p is not None]
+
+    def _wider_noise(self, nominal: UncertainModel, gain: float, offset: float) -> Schedulable:
+        scale, extra = np.ones(nominal.n_outputs), np.zeros(nominal.n_outputs)
+        scale[list(channels(self.where))], extra[list(channels(self.where))] = gain, offset
+        return with_noise(nominal, lambda n: n * scale + extra)
