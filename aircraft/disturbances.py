@@ -1,0 +1,68 @@
+"""Bounded, band-limited noise: what the paper calls band-limited white noise, with the bounds that a
+set-membership observer needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import butter, sosfilt
+
+Array = NDArray[np.float64]
+
+RMS_PER_BOUND = 1 / 2.5
+_SETTLING_PERIODS = 6.0  # of the cut-off: a second-order Butterworth has decayed by exp(-27) then
+
+
+@dataclass(frozen=True)
+class BandLimitedNoise:
+    """Uniform white noise through a second-order Butterworth low-pass, scaled and clipped, per channel.
+
+    Parameters
+    ----------
+    bounds : (channels,) array
+        Half-widths >= 0. The rms before clipping is bound / 2.5; no sample exceeds the bound.
+    cutoffs_hz : (channels,) array
+        Cut-off frequencies, below half of the sampling frequency.
+    Ts : float
+        Sampling time [s].
+
+    Raises
+    ------
+    ValueError
+        For shapes that differ, a negative bound, or a cut-off outside (0, 0.5 / Ts).
+    """
+
+    bounds: ArrayLike
+    cutoffs_hz: ArrayLike
+    Ts: float
+
+    def __post_init__(self) -> None:
+        bounds, cutoffs = np.array(self.bounds, dtype=float), np.array(self.cutoffs_hz, dtype=float)
+        if bounds.ndim != 1 or bounds.shape != cutoffs.shape:
+            shapes = f"bounds has shape {bounds.shape} and cutoffs_hz {cutoffs.shape}"
+            raise ValueError(f"{shapes}; expected one value a channel in both")
+        if not (bounds >= 0).all() or not np.isfinite(bounds).all():
+            raise ValueError(f"bounds is {bounds}; expected finite half-widths >= 0")
+        if not self.Ts > 0:
+            raise ValueError(f"Ts is {self.Ts}; expected a positive sampling time in seconds")
+        if not ((cutoffs > 0) & (cutoffs < 0.5 / self.Ts)).all():
+            raise ValueError(f"cutoffs_hz is {cutoffs}; expected frequencies in (0, {0.5 / self.Ts}) Hz")
+        object.__setattr__(self, "bounds", bounds)
+        object.__setattr__(self, "cutoffs_hz", cutoffs)
+
+    def draw(self, samples: int, rng: np.random.Generator) -> Array:
+        """A stationary realisation, (samples, channels); the filters have settled before its first row."""
+        channels = zip(np.asarray(self.bounds), np.asarray(self.cutoffs_hz), strict=True)
+        return np.column_stack([self._channel(samples, bound, cutoff, rng) for bound, cutoff in channels])
+
+    def _channel(self, samples: int, bound: float, cutoff: float, rng: np.random.Generator) -> Array:
+        sections = butter(2, cutoff, fs=1 / self.Ts, output="sos")
+        settling = int(np.ceil(_SETTLING_PERIODS / (cutoff * self.Ts)))
+        impulse = np.zeros(settling)
+        impulse[0] = 1.0
+        gain = np.sqrt(np.sum(sosfilt(sections, impulse) ** 2) / 3)  # rms of uniform noise on [-1, 1] is 1/sqrt(3)
+        white = rng.uniform(-1.0, 1.0, settling + samples)
+        coloured = sosfilt(sections, white)[settling:] * (RMS_PER_BOUND * bound / gain)
+        return np.clip(coloured, -bound, bound)

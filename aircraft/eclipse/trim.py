@@ -1,0 +1,70 @@
+"""Level trim of the surrogate and its linearisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+from aircraft.eclipse.simulator import Surrogate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trim:
+    """Steady level flight at one airspeed: alpha = theta [rad], elevator [deg], thrust command."""
+
+    airspeed: float
+    alpha: float
+    elevator_deg: float
+    thrust: float
+
+    @property
+    def x(self) -> Array:
+        """[u, w, theta, q]."""
+        return np.array([self.airspeed * np.cos(self.alpha), self.airspeed * np.sin(self.alpha), self.alpha, 0.0])
+
+    @property
+    def u(self) -> Array:
+        """[eta, tau]."""
+        return np.array([self.elevator_deg, self.thrust])
+
+    @property
+    def y(self) -> Array:
+        """[V, alpha, theta, q]."""
+        return np.array([self.airspeed, self.alpha, self.alpha, 0.0])
+
+
+def level_trim(surrogate: Surrogate, airspeed: float) -> Trim:
+    """The level trim at V [m/s].
+
+    Raises
+    ------
+    ValueError
+        If the equations have no solution at that airspeed.
+    """
+
+    def residual(unknowns: Array) -> Array:
+        trim = Trim(airspeed, *unknowns)
+        return surrogate.derivative(trim.x, trim.u)[[0, 1, 3]]
+
+    guess = np.array([140.0 / airspeed**2, 13800.0 / airspeed**2, 0.13])  # lift = weight fixes alpha V^2 and eta V^2
+    answer = root(residual, guess, tol=1e-13)
+    if np.abs(residual(answer.x)).max() > 1e-9:
+        raise ValueError(f"airspeed is {airspeed} m/s: no level trim was found; expected a speed from 25 to 55 m/s")
+    return Trim(float(airspeed), *(float(v) for v in answer.x))
+
+
+def linearise(surrogate: Surrogate, trim: Trim) -> tuple[Array, Array]:
+    """A (4, 4) and B (4, 2) of the surrogate at a trim, by central differences."""
+    point, steps = np.concatenate([trim.x, trim.u]), np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3, 1e-5])
+
+    def slope(direction: Array) -> Array:
+        ahead, behind = point + direction, point - direction
+        return surrogate.derivative(ahead[:4], ahead[4:]) - surrogate.derivative(behind[:4], behind[4:])
+
+    columns = np.column_stack([slope(e) / (2 * e.max()) for e in np.diag(steps)])
+    return columns[:, :4], columns[:, 4:]
