@@ -1,0 +1,109 @@
+"""Performance indices of a Boolean decision (Marzat et al. 2012, section 2.4 and Figure 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DetectionIndices:
+    """How well a Boolean decision told of a fault.
+
+    Attributes
+    ----------
+    delay : float
+        Seconds from the fault to the LAST switch from false to true, the first faulty sample counting as
+        one sampling time: a switch at that very sample has delay Ts. Infinite if the decision is false at
+        the last sample of the window. Not positive if an alarm from before the fault lasted to the end;
+        `false_alarm` is then set, and such a delay is no merit.
+    first_alarm : float
+        The same count to the first sample, from the fault on, at which the decision is true; infinite if
+        there is none. It differs from ``delay`` where the decision dropped out in between.
+    false_alarm : bool
+        Whether the decision was true at any sample before the fault.
+    false_detection_rate : float
+        Share of the time before the fault in which the decision was true; NaN without such time.
+    non_detection_rate : float
+        Share of the time from the fault on in which the decision was false.
+    """
+
+    delay: float
+    first_alarm: float
+    false_alarm: bool
+    false_detection_rate: float
+    non_detection_rate: float
+
+
+def detection_indices(
+    time: ArrayLike,
+    decision: ArrayLike,
+    t_from: float,
+    t_on: float | None = None,
+    t_hor: float | None = None,
+) -> DetectionIndices:
+    """Indices of one decision over one run; for isolation, pass the decision "this fault is isolated".
+
+    A sample's decision holds until the next sample; the last one for as long as the one before. What
+    happens outside the window from ``t_on`` to ``t_hor`` is not looked at: a decision that is true at
+    the first sample of the window counts as a switch there.
+
+    Parameters
+    ----------
+    time : (K,) array
+        Sample times [s], strictly increasing, at least two.
+    decision : (K,) array of bool
+    t_from : float
+        Time of the first faulty sample [s].
+    t_on : float, optional
+        Start of the window [s]; the first sample by default.
+    t_hor : float, optional
+        End of the window [s], not included; by default one sampling time after the last sample.
+
+    Raises
+    ------
+    ValueError
+        If shapes or times do not fit, or if not t_on <= t_from < t_hor, with samples on and after t_from.
+    """
+    times, alarm = _checked(time, decision)
+    edges = np.append(times, 2 * times[-1] - times[-2])
+    start = float(times[0]) if t_on is None else float(t_on)
+    end = float(edges[-1]) if t_hor is None else float(t_hor)
+    if not start <= t_from < end:
+        raise ValueError(f"t_from is {t_from} with a window from {start} to {end}; expected t_on <= t_from < t_hor")
+    # A fault time written as 0.57 means sample 57, although 57 * 0.01 differs from it in the last digit.
+    slack = 1e-6 * float(np.min(np.diff(times)))
+    first, fault, last = (int(np.searchsorted(times, t - slack)) for t in (start, t_from, end))
+    if fault >= last:
+        raise ValueError(f"t_from is {t_from} but no sample of the window is on or after it")
+    # Delays are counted to the end of the sample's hold, so the first faulty sample counts as one Ts.
+    ends, durations = edges[1:] - times[fault], np.diff(edges)
+    before, after = slice(first, fault), slice(fault, last)
+    switches = first + np.flatnonzero(np.diff(alarm[first:last].astype(int), prepend=0) == 1)
+    hits = np.flatnonzero(alarm[after])
+    return DetectionIndices(
+        delay=float(ends[switches[-1]]) if alarm[last - 1] else np.inf,
+        first_alarm=float(ends[fault + hits[0]]) if hits.size else np.inf,
+        false_alarm=bool(alarm[before].any()),
+        false_detection_rate=_share(durations[before], alarm[before]),
+        non_detection_rate=_share(durations[after], ~alarm[after]),
+    )
+
+
+def _share(durations: Array, true: NDArray[np.bool_]) -> float:
+    return float(durations[true].sum() / durations.sum()) if durations.size else np.nan
+
+
+def _checked(time: ArrayLike, decision: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    times, alarm = np.asarray(time, dtype=float), np.asarray(decision)
+    if times.ndim != 1 or times.size < 2:
+        raise ValueError(f"time has shape {times.shape}; expected (K,) with at least two samples")
+    if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise ValueError("time is not strictly increasing; expected finite, increasing seconds")
+    if alarm.shape != times.shape or alarm.dtype != np.bool_:
+        raise ValueError(f"decision has shape {alarm.shape} and type {alarm.dtype}; expected {times.shape} of bool")
+    return times, alarm
