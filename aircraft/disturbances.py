@@ -4,6 +4,7 @@ set-membership observer needs."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,11 +59,16 @@ class BandLimitedNoise:
         return np.column_stack([self._channel(samples, bound, cutoff, rng) for bound, cutoff in channels])
 
     def _channel(self, samples: int, bound: float, cutoff: float, rng: np.random.Generator) -> Array:
-        sections = butter(2, cutoff, fs=1 / self.Ts, output="sos")
-        settling = int(np.ceil(_SETTLING_PERIODS / (cutoff * self.Ts)))
-        impulse = np.zeros(settling)
-        impulse[0] = 1.0
-        gain = np.sqrt(np.sum(sosfilt(sections, impulse) ** 2) / 3)  # rms of uniform noise on [-1, 1] is 1/sqrt(3)
-        white = rng.uniform(-1.0, 1.0, settling + samples)
-        coloured = sosfilt(sections, white)[settling:] * (RMS_PER_BOUND * bound / gain)
-        return np.clip(coloured, -bound, bound)
+        sections, settling, gain = _low_pass(float(cutoff), self.Ts)
+        coloured = sosfilt(sections, rng.uniform(-1.0, 1.0, settling + samples))[settling:]
+        return np.clip(coloured * (RMS_PER_BOUND * bound / gain), -bound, bound)
+
+
+@cache
+def _low_pass(cutoff: float, Ts: float) -> tuple[Array, int, float]:
+    """Filter sections, samples until it has settled, and the rms of its output for uniform noise on [-1, 1]."""
+    sections = butter(2, cutoff, fs=1 / Ts, output="sos")
+    settling = int(np.ceil(_SETTLING_PERIODS / (cutoff * Ts)))
+    impulse = np.zeros(settling)
+    impulse[0] = 1.0
+    return sections, settling, float(np.sqrt(np.sum(sosfilt(sections, impulse) ** 2) / 3))

@@ -21,7 +21,7 @@ does not notice a change in another file.
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 from numba import njit
@@ -172,8 +172,7 @@ def fly(
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, one row a sample of disturbance")
     x, u, y = np.zeros((samples, 6)), np.zeros((samples, 2)), np.zeros((samples, 4))
     x[0, :4] = np.asarray(x0, dtype=float)
-    c = controller
-    law = (c.A, c.B, c.C, c.M, c.K, c.u_trim, c.y_trim, c.lower, c.upper)
+    law = tuple(np.ascontiguousarray(getattr(controller, f.name)) for f in fields(Controller))
     speed_moment = np.array([*Derivatives().polynomials["M_u"], corruption.moment_reference])
     _fly(x, u, y, *arrays, speed_moment, law, surrogate.packed(), Ts)
     if not np.isfinite(x).all():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ class Trim:
         return np.array([self.airspeed, self.alpha, self.alpha, 0.0])
 
 
+@lru_cache(maxsize=1024)
 def level_trim(surrogate: Surrogate, airspeed: float) -> Trim:
     """The level trim at V [m/s].
 
@@ -68,3 +70,18 @@ def linearise(surrogate: Surrogate, trim: Trim) -> tuple[Array, Array]:
 
     columns = np.column_stack([slope(e) / (2 * e.max()) for e in np.diag(steps)])
     return columns[:, :4], columns[:, 4:]
+
+
+def output_matrix(trim: Trim) -> Array:
+    """Derivative (4, 4) of the measurements [V, alpha, theta, q] with respect to [u, w, theta, q]."""
+    sine, cosine = np.sin(trim.alpha), np.cos(trim.alpha)
+    C = np.zeros((4, 4))
+    C[0, :2] = cosine, sine
+    C[1, :2] = -sine / trim.airspeed, cosine / trim.airspeed
+    C[2, 2] = C[3, 3] = 1.0
+    return C
+
+
+def gust_directions(surrogate: Surrogate) -> Array:
+    """Continuous directions (4, 3) of d_u, d_w and d_q: a normal gust also pitches, through dw/dt."""
+    return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, surrogate.M_wdot, 1.0]])

@@ -1,0 +1,119 @@
+"""Measures what the observers' models leave out of the simulator, and writes the bounds that they use.
+
+Run ``python -m aircraft.eclipse.mismatch`` after any change of the derivatives, the surrogate, the
+autopilot, the noise sets or the table. The seeds are the command's own: no study uses their spawn key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from aircraft.eclipse.models import BOUNDS_FILE, NAMES, MismatchBounds
+from aircraft.eclipse.noise import NOISE_SETS
+from aircraft.eclipse.scenarios import FAULTS, HEALTHY, PROFILES, Run, Scenarios
+from svo.faults import ActuatorFault, PlantFault
+
+Array = NDArray[np.float64]
+
+SPAWN_KEY = 0x0EC11953  # a study spawns its runs' seeds as 0, 1, 2, ...; this branch is never reached that way
+MARGIN = 1.5
+RUNS = 500
+BOUNDS_PATH = Path(__file__).with_name(BOUNDS_FILE)
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """What the fault's own model, with the true Delta and the true gusts, leaves out of one flight.
+
+    ``state`` (K - 1, 4) is x(k+1) minus its prediction; ``output`` (K, 4) is h(x) - C x - c.
+    """
+
+    state: Array
+    output: Array
+
+
+def mismatch(run: Run, scenarios: Scenarios) -> Mismatch:
+    """One-step mismatch of the scheduled model against the simulator along a flight."""
+    blocks = scenarios.model.blocks.over(run.schedule)
+    x, u = run.flight.x[:, :4], run.flight.u
+    predicted = _apply(blocks["A"], x) + _apply(blocks["B"], u) + blocks["a"] + _apply(blocks["E"][:, :, :3], run.gusts)
+    if isinstance(run.fault, ActuatorFault):
+        lost = run.fault.delta(run.time)[:, None] * u
+        predicted[:, :] -= blocks["B"][:, :, 0] * lost[:, :1]
+    if isinstance(run.fault, PlantFault):
+        direction = _apply(blocks["moment"], x) + blocks["moment_offset"]
+        predicted += run.fault.delta(run.time)[:, None] * direction
+    true_output = np.column_stack([np.hypot(x[:, 0], x[:, 1]), np.arctan2(x[:, 1], x[:, 0]), x[:, 2:]])
+    return Mismatch(x[1:] - predicted[:-1], true_output - _apply(blocks["C"], x) - blocks["c"])
+
+
+def largest(scenarios: Scenarios, fault: str, noise: str, runs: int) -> MismatchBounds:
+    """The largest mismatch seen over ``runs`` flights of each profile of a fault (or fault-free)."""
+    state, output = np.zeros(4), np.zeros(4)
+    for seed in _seeds(noise, fault, runs):
+        for profile in PROFILES if fault != HEALTHY else ("",):
+            seen = mismatch(scenarios.run(fault, profile, noise, seed), scenarios)
+            state = np.maximum(state, np.abs(seen.state).max(axis=0))
+            output = np.maximum(output, np.abs(seen.output).max(axis=0))
+    return MismatchBounds(state, output)
+
+
+def measure(scenarios: Scenarios, runs: int, margin: float = MARGIN) -> dict[str, dict[str, MismatchBounds]]:
+    """Bounds for every noise set and observer; a fault's observer also covers fault-free flight."""
+    result: dict[str, dict[str, MismatchBounds]] = {}
+    for noise in NOISE_SETS:
+        healthy = largest(scenarios, HEALTHY, noise, runs)
+        seen = {"nominal": healthy}
+        for fault in FAULTS:
+            faulty = largest(scenarios, fault, noise, runs)
+            both = [np.maximum(getattr(faulty, name), getattr(healthy, name)) for name in ("state", "output")]
+            seen[fault] = MismatchBounds(*both)
+        result[noise] = {name: MismatchBounds(margin * b.state, margin * b.output) for name, b in seen.items()}
+    return result
+
+
+def _apply(matrices: Array, vectors: Array) -> Array:
+    return np.einsum("kij,kj->ki", matrices, vectors)
+
+
+def _seeds(noise: str, fault: str, runs: int) -> Iterator[np.random.SeedSequence]:
+    branch = (SPAWN_KEY, list(NOISE_SETS).index(noise), (HEALTHY, *FAULTS).index(fault))
+    return (np.random.SeedSequence(0, spawn_key=(*branch, i)) for i in range(runs))
+
+
+def to_toml(bounds: Mapping[str, Mapping[str, MismatchBounds]], runs: int, margin: float) -> str:
+    """The text of the bounds file."""
+    lines = [
+        "# Measured, not written by hand: the mismatch of the scheduled models against the simulator,",
+        f"# {margin} times the largest value seen in {runs} flights of each fault and profile with each noise set.",
+        f"# python -m aircraft.eclipse.mismatch --runs {runs} --margin {margin}",
+        f"# state: per sample, {', '.join(NAMES['states'])} [m/s, m/s, rad, rad/s];"
+        f" output: {', '.join(NAMES['outputs'])} [m/s, rad, rad, rad/s]",
+    ]
+    for noise, observers in bounds.items():
+        for observer, b in observers.items():
+            lines += ["", f"[{noise}.{observer}]"]
+            lines += [f"{name} = [{', '.join(f'{v:.3e}' for v in getattr(b, name))}]" for name in ("state", "output")]
+    return "\n".join(lines) + "\n"
+
+
+def main(
+    runs: Annotated[int, typer.Option(help="Flights of each fault and profile, with each noise set.")] = RUNS,
+    margin: Annotated[float, typer.Option(help="Factor on the largest mismatch seen.")] = MARGIN,
+    out: Annotated[Path, typer.Option(help="Where to write the bounds.")] = BOUNDS_PATH,
+) -> None:
+    """Measure the mismatch bounds of the Eclipse's observers and write them."""
+    text = to_toml(measure(Scenarios(), runs, margin), runs, margin)
+    out.write_text(text, encoding="utf-8")
+    typer.echo(text)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,131 @@
+"""The Eclipse's longitudinal axis as a plant of the studies (entry point ``eclipse``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from aircraft.eclipse.autopilot import DESIGN_AIRSPEED
+from aircraft.eclipse.models import ScheduledModel, read_bounds
+from aircraft.eclipse.noise import NOISE_SETS
+from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS, Scenarios
+from aircraft.eclipse.schedule import AirspeedFilter
+from aircraft.eclipse.trim import level_trim
+from polytopes import HPolytope
+from svo.isolation.architectures import ArchitectureI
+from svo.log import Log
+from svo.model import UncertainModel
+from svo.observers.window import WindowObserver
+from svo.plant import Column, Columns, Reference
+
+REFERENCE: Mapping[tuple[str, str], Reference] = MappingProxyType(
+    {
+        ("alpha", "step"): Reference("0.01", "0.01"),
+        ("elevator", "step"): Reference("0.02", "-"),
+        ("dynamics", "step"): Reference("0.02", "-"),
+        ("alpha", "hard"): Reference("< 0.5", "-"),
+        ("elevator", "hard"): Reference("< 0.5", "-"),
+        ("dynamics", "hard"): Reference("< 0.5", "-"),
+        ("alpha", "soft"): Reference("< 0.5", "about 3.5"),
+        ("elevator", "soft"): Reference("< 0.5", "-"),
+        ("dynamics", "soft"): Reference("< 0.5", "-"),
+    }
+)
+
+COLUMNS = Columns(
+    inputs=(Column("elevator_deg", "deg"), Column("thrust_command", "0.983 kN")),
+    outputs=(
+        Column("airspeed_m_s", "m/s"),
+        Column("alpha_rad", "rad"),
+        Column("theta_rad", "rad"),
+        Column("pitch_rate_rad_s", "rad/s"),
+    ),
+    states=(
+        Column("true_u_m_s", "m/s"),
+        Column("true_w_m_s", "m/s"),
+        Column("true_theta_rad", "rad"),
+        Column("true_q_rad_s", "rad/s"),
+    ),
+)
+
+# Any state of a flight between 25 and 55 m/s; the first measurement cuts it down to the sensors' bounds.
+INITIAL_LOWER = (15.0, -15.0, -0.8, -2.0)
+INITIAL_UPPER = (65.0, 25.0, 0.8, 2.0)
+
+
+@dataclass(frozen=True)
+class Eclipse:
+    """The Eclipse UAV in closed loop about 37 m/s, with the faults of Rosa and Silvestre (2013), section 6.
+
+    The observers' bounds are measured on these flights (`aircraft.eclipse.mismatch`): they promise nothing
+    for a flight unlike them.
+
+    Parameters
+    ----------
+    scenarios : Scenarios
+    horizon : int
+        Steps in the observers' windows.
+    """
+
+    scenarios: Scenarios = field(default_factory=Scenarios)
+    horizon: int = 10
+    name: str = "eclipse"
+    title: str = "Eclipse UAV, longitudinal axis: alpha sensor, elevator and M_u faults"
+    Ts: float = TS
+    fault_time: float = FAULT_TIME
+    faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: {name: tuple(PROFILES) for name in FAULTS})
+    noise_sets: tuple[str, ...] = tuple(NOISE_SETS)
+    columns: Columns = COLUMNS
+    reference: Mapping[tuple[str, str], Reference] = field(default_factory=lambda: REFERENCE)
+    reference_title: str = "Rosa and Silvestre, Control Engineering Practice 21 (2013), section 6: mean of 10 runs [s]"
+
+    def duration(self, fault: str, profile: str) -> float:
+        """Length of a run [s]; ``fault`` may be "none"."""
+        return self.scenarios.duration(fault, profile)
+
+    def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
+        """One run with its true states [u, w, theta, q]; ``fault`` may be "none". The inputs are commands."""
+        run = self.scenarios.run(fault, profile, noise, seed)
+        return Log(time=run.time, u=run.flight.u, y=run.flight.y, x=run.flight.x[:, :4], schedule=run.schedule)
+
+    def models(self, noise: str) -> dict[str, UncertainModel]:
+        """The observers' models: "nominal", then one for each fault, which contains the healthy aircraft."""
+        if noise not in NOISE_SETS:
+            raise ValueError(f"noise is {noise!r}; expected one of {', '.join(NOISE_SETS)}")
+        bounds, scheduled = read_bounds()[noise], self.scenarios.model
+        models = {"nominal": scheduled.model(noise, bounds["nominal"])}
+        for name in self.faults:
+            fault = self.scenarios.fault(name, LARGEST)
+            models[name] = fault.model(scheduled.model(noise, bounds[name]))
+        return models
+
+    def bank(self, noise: str) -> ArchitectureI:
+        """A fresh isolation bank of window observers with box templates."""
+        initial = HPolytope.box(INITIAL_LOWER, INITIAL_UPPER)
+        observers = {name: WindowObserver(m, initial, horizon=self.horizon) for name, m in self.models(noise).items()}
+        return ArchitectureI(nominal=observers.pop("nominal"), faults=observers)
+
+    def scheduler(self) -> AirspeedFilter:
+        """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""
+        return AirspeedFilter(self.Ts, DESIGN_AIRSPEED)
+
+
+def eclipse(reference: str = "absolute") -> Eclipse:
+    """The plant that is registered.
+
+    Parameters
+    ----------
+    reference : {"absolute", "deviation"}
+        Whether the dynamics fault scales M_u times the absolute u, or times its deviation from the trim at
+        37 m/s. In regulated flight the second one hardly shows.
+    """
+    if reference == "absolute":
+        return Eclipse()
+    if reference == "deviation":
+        model = ScheduledModel(TS)
+        trim = level_trim(model.surrogate, DESIGN_AIRSPEED)
+        return Eclipse(Scenarios(ScheduledModel(TS, moment_reference=float(trim.x[0]))))
+    raise ValueError(f"reference is {reference!r}; expected 'absolute' or 'deviation'")

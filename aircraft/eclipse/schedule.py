@@ -1,0 +1,101 @@
+"""Scheduling on measured airspeed: the causal filter, and one table of all scheduled matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+FILTER_TIME_S = 0.5
+
+
+class AirspeedFilter:
+    """First-order low-pass of 0.5 s on measured airspeed, called with each measurement in turn.
+
+    It starts at the first measured airspeed. A missing (NaN) airspeed holds the last value; while none has
+    been measured yet, the value is ``initial``.
+    """
+
+    def __init__(self, Ts: float, initial: float) -> None:
+        self._gain = 1.0 - float(np.exp(-Ts / FILTER_TIME_S))
+        self._value = float(initial)
+        self._started = False
+
+    def __call__(self, y: ArrayLike) -> float:
+        """Scheduling airspeed [m/s] at the sample of y = [V, alpha, theta, q]."""
+        airspeed = float(np.asarray(y, dtype=float)[0])
+        if not np.isnan(airspeed):
+            self._value += (self._gain if self._started else 1.0) * (airspeed - self._value)
+            self._started = True
+        return self._value
+
+
+@dataclass(frozen=True)
+class ScheduledBlocks:
+    """Named arrays tabulated over airspeed and interpolated linearly, all at once.
+
+    The blocks of the last schedule are remembered, so that the observers of a bank, which all ask for the
+    same sample, share the work. Outside the table its nearest end is used: the derivatives are valid
+    from 25 to 55 m/s only, and the mismatch bounds promise nothing beyond.
+
+    Parameters
+    ----------
+    start, step : float
+        First airspeed and spacing of the table [m/s].
+    tables : mapping of name to (points, ...) array
+    """
+
+    start: float
+    step: float
+    tables: Mapping[str, Array]
+    _flat: Array = field(init=False, repr=False)
+    _last: list[tuple[Any, dict[str, Array]]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        points = {len(table) for table in self.tables.values()}
+        if len(points) != 1 or points.pop() < 2:
+            raise ValueError(f"tables have {[len(t) for t in self.tables.values()]} points; expected one count >= 2")
+        flat = np.hstack([np.asarray(table).reshape(len(table), -1) for table in self.tables.values()])
+        object.__setattr__(self, "_flat", np.ascontiguousarray(flat))
+        object.__setattr__(self, "_last", [(None, {})])
+
+    def at(self, schedule: Any) -> dict[str, Array]:
+        """All blocks at one airspeed [m/s]; the arrays are shared, do not write into them.
+
+        Raises
+        ------
+        ValueError
+            If the schedule is not a finite number.
+        """
+        remembered, blocks = self._last[0]
+        if schedule != remembered:
+            blocks = {name: values[0] for name, values in self.over([schedule]).items()}
+            self._last[0] = (schedule, blocks)  # one assignment: safe where observers run in threads
+        return blocks
+
+    def over(self, schedule: ArrayLike) -> dict[str, Array]:
+        """Blocks at many airspeeds (K,): name to (K, ...) array."""
+        airspeed = np.asarray(schedule, dtype=float)
+        if airspeed.ndim != 1 or not np.isfinite(airspeed).all():
+            raise ValueError(f"schedule is {schedule!r}; expected finite airspeeds in m/s")
+        position = np.clip((airspeed - self.start) / self.step, 0.0, len(self._flat) - 1)
+        index = np.minimum(position.astype(int), len(self._flat) - 2)
+        fraction = (position - index)[:, None]
+        rows = (1.0 - fraction) * self._flat[index] + fraction * self._flat[index + 1]
+        blocks, first = {}, 0
+        for name, table in self.tables.items():
+            size = int(np.prod(table.shape[1:]))
+            blocks[name] = rows[:, first : first + size].reshape(len(rows), *table.shape[1:])
+            first += size
+        return blocks
+
+    def block(self, name: str) -> Callable[[Any], Array]:
+        """One block as a function of the schedule."""
+        if name not in self.tables:
+            raise ValueError(f"name is {name!r}; expected one of {', '.join(self.tables)}")
+        return lambda schedule: self.at(schedule)[name]
