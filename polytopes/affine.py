@@ -1,0 +1,143 @@
+"""Solutions of ``C x = d``, found by exact elimination and rounded only at the end.
+
+The rank and the consistency of equalities are decided in rationals, so an equality stays an equality however small its
+coefficients are, and no tolerance takes a dependent row for an independent one.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from numpy.typing import NDArray
+
+from polytopes.exact import ZERO, Multipliers, rational, rational_matrix, rational_vector, to_floats
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class AffineSet:
+    """``{x : C x = d}`` as ``x = point + basis z``, where z is the vector of free coordinates of x.
+
+    Attributes
+    ----------
+    pivots, free : list of int
+        Coordinates that the equalities determine, and the others.
+    solved : fmpq_mat
+        Reduced rows ``x_pivot = solved[:, -1] - solved[:, :-1] x_free``, exact.
+    contradiction : dict or None
+        Multipliers mu with ``mu'C = 0`` and ``mu'd < 0`` if there is no solution.
+    """
+
+    dim: int
+    pivots: list[int]
+    free: list[int]
+    solved: fmpq_mat
+    contradiction: Multipliers | None
+
+    @cached_property
+    def point(self) -> Floats:
+        """A solution (n,): the one with free coordinates zero."""
+        point = np.zeros(self.dim)
+        if self.pivots:
+            point[self.pivots] = to_floats(self.solved[k, len(self.free)] for k in range(len(self.pivots)))
+        return point
+
+    @cached_property
+    def basis(self) -> Floats:
+        """Directions of the set, array (n, number of free coordinates)."""
+        basis = np.zeros((self.dim, len(self.free)))
+        basis[self.free, np.arange(len(self.free))] = 1.0
+        for k, j in enumerate(self.pivots):
+            basis[j] = to_floats(-self.solved[k, q] for q in range(len(self.free)))
+        return basis
+
+    def lift(self, z: Floats) -> Floats:
+        """Point or points with free coordinates z, array (..., free) to (..., n)."""
+        if not self.pivots:
+            return z.copy()
+        x: Floats = self.point + z @ self.basis.T
+        x[..., self.free] = z
+        return x
+
+    def lift_exactly(self, z: list[fmpq]) -> list[fmpq]:
+        """The exact point with free coordinates z."""
+        x = [ZERO] * self.dim
+        for j, value in zip(self.free, z, strict=True):
+            x[j] = value
+        for k, j in enumerate(self.pivots):
+            x[j] = self.solved[k, len(self.free)] - sum((self.solved[k, q] * v for q, v in enumerate(z)), ZERO)
+        return x
+
+    def restrict(self, A: Floats, b: Floats) -> tuple[Floats, Floats]:
+        """Rows ``A x <= b`` on the set, in its free coordinates.
+
+        Rows that cancel (their own coefficients were much larger) are formed exactly: rounding would turn a row that is
+        constant on the set into noise.
+        """
+        if not self.pivots:
+            return A, b
+        reduced, rhs = A @ self.basis, b - A @ self.point
+        magnitude = np.abs(A) @ np.abs(self.basis)
+        cancelled = (np.abs(reduced) < 1e-3 * magnitude).any(axis=1) if self.free else np.ones(len(b), bool)
+        for i in np.flatnonzero(cancelled).tolist():
+            row, constant = self._restrict_exactly(A[i], b[i])
+            reduced[i], rhs[i] = to_floats(row), to_floats([constant])[0]
+        return reduced, rhs
+
+    def _restrict_exactly(self, row: Floats, rhs: float) -> tuple[list[fmpq], fmpq]:
+        exact = rational_vector(row)
+        coefficients, constant = [exact[j] for j in self.free], rational(rhs)
+        for k, j in enumerate(self.pivots):
+            if exact[j] != 0:
+                constant -= exact[j] * self.solved[k, len(self.free)]
+                for q in range(len(self.free)):
+                    coefficients[q] -= exact[j] * self.solved[k, q]
+        return coefficients, constant
+
+
+def affine_set(C: Floats, d: Floats) -> AffineSet:
+    """Solve ``C x = d`` exactly.
+
+    Parameters
+    ----------
+    C, d : arrays (q, n) and (q,)
+    """
+    q, n = C.shape
+    if q == 0:
+        return AffineSet(n, [], list(range(n)), fmpq_mat(0, n + 1), None)
+    order = _pivot_order(C)
+    table = rational_matrix(np.hstack([C[:, order], d[:, None]]))
+    reduced, rank = table.rref()
+    leading = [next(j for j in range(n + 1) if reduced[k, j] != 0) for k in range(rank)]
+    if leading and leading[-1] == n:
+        return AffineSet(n, [], list(range(n)), fmpq_mat(0, n + 1), _contradiction(C, d))
+    columns = [j for j in range(n) if j not in leading]
+    pivots, free = [int(order[j]) for j in leading], [int(order[j]) for j in columns]
+    entries = [reduced[k, j] for k in range(rank) for j in [*columns, n]]
+    return AffineSet(n, pivots, free, fmpq_mat(rank, len(columns) + 1, entries), None)
+
+
+def _pivot_order(C: Floats) -> NDArray[np.int64]:
+    """Columns of C, those that make good pivots first (complete pivoting in floats)."""
+    work = C / np.where(np.abs(C).max(axis=1) > 0, np.abs(C).max(axis=1), 1.0)[:, None]
+    chosen: list[int] = []
+    for _ in range(min(work.shape)):
+        i, j = np.unravel_index(np.argmax(np.abs(work)), work.shape)
+        if work[i, j] == 0:
+            break
+        chosen.append(int(j))
+        work = work - np.outer(work[:, j] / work[i, j], work[i])
+        work[i], work[:, j] = 0.0, 0.0
+    return np.array(chosen + [j for j in range(C.shape[1]) if j not in chosen], dtype=np.int64)
+
+
+def _contradiction(C: Floats, d: Floats) -> Multipliers:
+    """Multipliers mu with mu'C = 0 and mu'd = -1."""
+    q, n = C.shape
+    reduced, rank = rational_matrix(np.hstack([C, d[:, None], np.eye(q)])).rref()
+    for k in range(rank):
+        if all(reduced[k, j] == 0 for j in range(n)) and reduced[k, n] != 0:
+            return {i: -reduced[k, n + 1 + i] for i in range(q) if reduced[k, n + 1 + i] != 0}
+    raise AssertionError("an inconsistent system has a row that reduces to 0 = 1")

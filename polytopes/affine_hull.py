@@ -1,0 +1,63 @@
+"""Implicit equalities: rows that hold with equality at every point, hence the affine hull and its dimension."""
+
+import numpy as np
+
+from polytopes.errors import EmptySetError, UndecidedError
+from polytopes.exact_simplex import affordable, exact_feasibility
+from polytopes.rows import Rows
+from polytopes.support import known_nonempty
+
+
+def implicit_equalities(P: Rows) -> list[int]:
+    """Numbers of the rows of A that hold with equality all over P (a set of rows that spans the affine hull).
+
+    Exact: a set of width 1e-12 is not flat.  If no point satisfies all rows strictly, the multipliers that prove it sit
+    on rows that are equalities; these are made explicit, and the search goes on in the smaller space.
+
+    Raises
+    ------
+    EmptySetError
+        If P is empty.
+    UndecidedError
+        If P is thin and too large for rational arithmetic.
+    """
+    if not known_nonempty(P):
+        raise EmptySetError("the empty set has no affine hull; ask emptiness() first.")
+    found: list[int] = []
+    rest = P
+    while rest.program.kept.size and rest.program.thin:
+        fresh = _equalities_of_a_proof(rest)
+        if not fresh:
+            return found
+        numbers = [i for i in range(P.b.size) if i not in found]
+        found = sorted(found + [numbers[i] for i in fresh])
+        rest = _made_explicit(P, found)
+    return found
+
+
+def _equalities_of_a_proof(P: Rows) -> list[int]:
+    """Rows that carry a proof that P has no strict point; empty if it has one."""
+    program = P.program
+    if not affordable(*P.A.shape):
+        raise UndecidedError(f"cannot tell whether a thin set of {P.A.shape[0]} rows is flat: too large to do exactly.")
+    kept = program.kept
+    outcome = exact_feasibility(P.A[kept], P.b[kept], program.flat, program.interior.point, strictly=True)
+    if outcome.status == "limit":
+        raise UndecidedError("cannot tell whether a thin set is flat: the rational simplex reached its pivot limit.")
+    return [] if outcome.status == "reached" else [int(kept[i]) for i in outcome.multipliers]
+
+
+def _made_explicit(P: Rows, rows: list[int]) -> Rows:
+    others = np.setdiff1d(np.arange(P.b.size), rows)
+    return Rows(P.A[others], P.b[others], np.vstack([P.C, P.A[rows]]), np.concatenate([P.d, P.b[rows]]))
+
+
+def explicit(P: Rows) -> Rows:
+    """The same set with its implicit equalities made explicit; P itself if there are none."""
+    rows = implicit_equalities(P)
+    return _made_explicit(P, rows) if rows else P
+
+
+def affine_dim(P: Rows) -> int:
+    """Dimension of the affine hull of P; -1 if P is empty."""
+    return len(explicit(P).program.flat.free) if known_nonempty(P) else -1

@@ -1,0 +1,152 @@
+"""Farkas certificates: rational multipliers that prove a system of rows to have no solution."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from numpy.typing import NDArray
+
+from polytopes.exact import ZERO, Multipliers, combine, rational, rational_matrix, refutes
+
+Floats = NDArray[np.float64]
+
+
+class HasRows(Protocol):
+    """Anything with rows ``A x <= b``, ``C x = d``."""
+
+    @property
+    def A(self) -> Floats: ...
+    @property
+    def b(self) -> Floats: ...
+    @property
+    def C(self) -> Floats: ...
+    @property
+    def d(self) -> Floats: ...
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Multipliers ``lambda >= 0`` on ``A x <= b`` and free mu on ``C x = d`` that combine to ``0 <= negative``.
+
+    Attributes
+    ----------
+    inequality, equality : dict of int to fmpq
+        Multipliers by row number; rows that are absent have multiplier zero.
+    """
+
+    inequality: Multipliers
+    equality: Multipliers
+
+    def verify(self, P: HasRows) -> bool:
+        """Whether this proves P empty, in exact rational arithmetic on the floats of P.
+
+        True only if all lambda are nonnegative, ``lambda'A + mu'C`` is exactly zero and ``lambda'b + mu'd < 0``.
+        """
+        return refutes(P.A, P.b, P.C, P.d, self.inequality, self.equality)
+
+    def gap(self, P: HasRows) -> float:
+        """``-(lambda'b + mu'd)`` with multipliers of sum one: how far the rows are from having a common point.
+
+        In the units of b.  A gap of some 1e-16 |b| says that the rows contradict each other only by rounding.
+        """
+        _, bound = combine(P.A, P.b, self.inequality)
+        _, value = combine(P.C, P.d, self.equality)
+        total = sum((abs(v) for v in [*self.inequality.values(), *self.equality.values()]), ZERO)
+        if total == 0:
+            return 0.0
+        ratio = -(bound + value) / total
+        return int(ratio.p) / int(ratio.q)
+
+    def to_dict(self) -> dict[str, dict[str, str]]:
+        """A dict of strings that JSON can hold without loss: row number to ``"numerator/denominator"``."""
+        return {
+            "inequality": {str(i): f"{v.p}/{v.q}" for i, v in sorted(self.inequality.items())},
+            "equality": {str(i): f"{v.p}/{v.q}" for i, v in sorted(self.equality.items())},
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Read what `to_dict` wrote.
+
+        Raises
+        ------
+        ValueError
+            If a part is missing or an entry is not a fraction of integers.
+        """
+        return cls(_parse(data, "inequality"), _parse(data, "equality"))
+
+
+def _parse(data: Mapping[str, Any], part: str) -> Multipliers:
+    try:
+        entries = data[part].items()
+    except (KeyError, AttributeError, TypeError):
+        raise ValueError(f"certificate has no table {part!r} of multipliers; expected what to_dict writes.") from None
+    multipliers: Multipliers = {}
+    for row, text in entries:
+        try:
+            numerator, denominator = str(text).split("/")
+            multipliers[int(row)] = fmpq(int(numerator), int(denominator))
+        except (ValueError, ZeroDivisionError):
+            raise ValueError(
+                f"certificate[{part!r}][{row!r}] is {text!r}; expected a row number and 'numerator/denominator'."
+            ) from None
+    return multipliers
+
+
+def exact_certificate(P: HasRows, weights: Floats) -> Certificate | None:
+    """Exact certificate on the support of float multipliers; None if that support carries no proof.
+
+    The multipliers of the support solve ``lambda'A + mu'C = 0`` in rationals.  The largest ones are solved for, so that
+    rounding is absorbed where it cannot change a sign; any that the equations leave free keep their float values.
+
+    Parameters
+    ----------
+    P : object with rows
+    weights : array (m,)
+        Approximate Farkas multipliers, nonnegative up to rounding.
+    """
+    support = np.flatnonzero(weights > 1e-13 * np.max(weights, initial=0.0))
+    support = support[np.argsort(-weights[support], kind="stable")]
+    q, k = P.C.shape[0], support.size
+    if k == 0:
+        return None
+    leader = rational(weights[support[0]])
+    columns = np.vstack([P.C, P.A[support[1:]], P.A[support[:1]]]).T
+    solution = _solve_free(rational_matrix(columns), [rational(w) for w in weights[support[1:]]], leader)
+    if solution is None:
+        return None
+    equality = {j: v for j, v in enumerate(solution[:q]) if v != 0}
+    lam = {int(i): v for i, v in zip(support[1:], solution[q:], strict=True) if v != 0}
+    certificate = Certificate({int(support[0]): leader, **lam}, equality)
+    return certificate if certificate.verify(P) else None
+
+
+def complete_certificate(P: HasRows, inequality: Multipliers) -> Certificate:
+    """Certificate of exact multipliers lambda and the mu that solve ``lambda'A + mu'C = 0``, which must be solvable."""
+    target, _ = combine(P.A, P.b, inequality)
+    q, n = P.C.shape
+    table = rational_matrix(P.C.T)
+    entries = [table[j, k] if k < q else -target[j] for j in range(n) for k in range(q + 1)]
+    reduced, rank = fmpq_mat(n, q + 1, entries).rref()
+    equality: Multipliers = {}
+    for k in range(rank):
+        leading = next(j for j in range(q + 1) if reduced[k, j] != 0)
+        if reduced[k, q] != 0:
+            equality[leading] = reduced[k, q]
+    return Certificate(inequality, equality)
+
+
+def _solve_free(columns: fmpq_mat, guesses: list[fmpq], leader: fmpq) -> list[fmpq] | None:
+    """Solve ``columns [u; leader] = 0`` for u; what is left free takes its guess, or zero (the first entries of u)."""
+    reduced, rank = columns.rref()
+    unknowns = columns.ncols() - 1
+    leading = [next(j for j in range(unknowns + 1) if reduced[k, j] != 0) for k in range(rank)]
+    if leading and leading[-1] == unknowns:
+        return None
+    solution = [ZERO] * (unknowns - len(guesses)) + guesses
+    free = [j for j in range(unknowns) if j not in leading]
+    for k, j in enumerate(leading):
+        solution[j] = -reduced[k, unknowns] * leader - sum((reduced[k, f] * solution[f] for f in free), ZERO)
+    return solution

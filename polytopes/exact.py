@@ -1,0 +1,116 @@
+"""Exact rational arithmetic on floats, and the one check that every proof of emptiness comes down to.
+
+Every finite float is a rational number, so a linear combination of rows of floats can be formed without any rounding.
+The functions take plain arrays and rational multipliers: a certificate of an `HPolytope` and the proof of an observer's
+window are checked by the same lines.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from numpy.typing import NDArray
+
+Multipliers = dict[int, fmpq]  # row index -> multiplier; rows that are absent have multiplier zero
+
+ZERO = fmpq(0)
+
+
+def rational(value: float) -> fmpq:
+    """The rational number that the float is."""
+    return fmpq(*float(value).as_integer_ratio())
+
+
+def rational_vector(values: NDArray[np.float64]) -> list[fmpq]:
+    """Entries of a vector as rationals."""
+    return [rational(v) for v in values.tolist()]
+
+
+def rational_matrix(matrix: NDArray[np.float64]) -> fmpq_mat:
+    """A float matrix as rationals (a column, if a vector is given)."""
+    rows, columns = matrix.shape if matrix.ndim == 2 else (matrix.shape[0], 1)
+    return fmpq_mat(rows, columns, rational_vector(matrix.ravel()))
+
+
+def to_floats(values: Iterable[fmpq]) -> NDArray[np.float64]:
+    """Rationals rounded to the nearest floats."""
+    return np.array([int(v.p) / int(v.q) for v in values], dtype=np.float64)
+
+
+def combine(rows: NDArray[np.float64], rhs: NDArray[np.float64], multipliers: Multipliers) -> tuple[list[fmpq], fmpq]:
+    """Exact ``multipliers' rows`` and ``multipliers' rhs``.
+
+    Parameters
+    ----------
+    rows, rhs : arrays (m, n) and (m,)
+    multipliers : dict of row index to rational
+
+    Returns
+    -------
+    coefficients, constant : list of n rationals, and one rational
+    """
+    coefficients = [ZERO] * rows.shape[1]
+    constant = ZERO
+    for i, weight in multipliers.items():
+        row = rows[i]
+        for j in np.flatnonzero(row).tolist():
+            coefficients[j] += weight * rational(row[j])
+        constant += weight * rational(rhs[i])
+    return coefficients, constant
+
+
+def least_over_box(
+    coefficients: Sequence[fmpq], lower: NDArray[np.float64], upper: NDArray[np.float64]
+) -> fmpq | None:
+    """Exact minimum of a linear form over a box; None if it is unbounded below.
+
+    Infinite bounds are allowed where the coefficient is exactly zero.
+    """
+    total = ZERO
+    for j, coefficient in enumerate(coefficients):
+        if coefficient == 0:
+            continue
+        bound = lower[j] if coefficient > 0 else upper[j]
+        if not np.isfinite(bound):
+            return None
+        total += coefficient * rational(bound)
+    return total
+
+
+def refutes(
+    A: NDArray[np.float64],
+    b: NDArray[np.float64],
+    C: NDArray[np.float64],
+    d: NDArray[np.float64],
+    inequality: Multipliers,
+    equality: Multipliers,
+    box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+) -> bool:
+    """Whether the multipliers prove that no x (in the box, if given) has ``A x <= b`` and ``C x = d`` (Farkas' lemma).
+
+    With ``g = lambda'A + mu'C`` and ``lambda >= 0``, the proof holds if the minimum of ``g'x`` over the box exceeds
+    ``lambda'b + mu'd``; without a box, g must be exactly zero.  Nothing is rounded.
+
+    Parameters
+    ----------
+    A, b, C, d : arrays (m, n), (m,), (q, n), (q,)
+    inequality, equality : dicts of row index to rational
+        Multipliers lambda on the rows of A and mu on the rows of C.
+    box : pair of arrays (n,), optional
+        Bounds of the variables; may be infinite.
+    """
+    if not (_indices_fit(inequality, A) and _indices_fit(equality, C)):
+        return False
+    if any(weight < 0 for weight in inequality.values()):
+        return False
+    form, bound = combine(A, b, inequality)
+    fixed, value = combine(C, d, equality)
+    form = [u + v for u, v in zip(form, fixed, strict=True)]
+    if box is None:
+        return all(v == 0 for v in form) and bound + value < 0
+    least = least_over_box(form, *box)
+    return least is not None and least > bound + value
+
+
+def _indices_fit(multipliers: Multipliers, rows: NDArray[np.float64]) -> bool:
+    return all(0 <= i < rows.shape[0] for i in multipliers)

@@ -1,0 +1,268 @@
+"""`HPolytope`: the set ``{x : A x <= b, C x = d}`` as an immutable value; a thin face over the operations."""
+
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes import containment, plotting
+from polytopes import support as support_functions
+from polytopes.affine_hull import affine_dim
+from polytopes.emptiness import Emptiness
+from polytopes.errors import as_array, as_matrix, as_vector
+from polytopes.hull import rows_of_points, vertices
+from polytopes.redundancy import minimal_rows
+from polytopes.rows import Rows
+from polytopes.support import Ball, SupportResult
+
+Floats = NDArray[np.float64]
+
+
+class HPolytope(Rows):
+    """The polyhedron ``{x in R^n : A x <= b, C x = d}``.
+
+    A value: its arrays are read-only copies of what was given, and every operation returns a new set.  Equalities are
+    explicit, so a flat set is no special case.  Rows of zeros are allowed (``0'x <= -1`` is empty).
+
+    Parameters
+    ----------
+    A, b : array_like (m, n) and (m,)
+        Inequalities; m may be 0.
+    C, d : array_like (q, n) and (q,), optional
+        Equalities.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an array is not numeric and finite, or a shape does not fit.
+
+    Notes
+    -----
+    Whether the set is empty is decided about exactly the floats that were given (see `emptiness`).  Every other number
+    is computed in floats from true vertices; supports agree with exact values to some 1e-13 of the size of the set.
+    """
+
+    @classmethod
+    def box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
+        """``{x : lower <= x <= upper}``; infinite bounds give no row.
+
+        Parameters
+        ----------
+        lower, upper : array_like (n,)
+            A lower bound above its upper bound gives the empty set.
+        """
+        low = as_array("lower", lower, 1, finite=False)
+        high = as_array("upper", upper, 1, finite=False)
+        if low.shape != high.shape:
+            raise ValueError(f"upper has shape {high.shape}; expected {low.shape}, the shape of lower.")
+        if np.isposinf(low).any() or np.isneginf(high).any():
+            raise ValueError("lower is +inf or upper is -inf somewhere; expected -inf, +inf or a finite bound.")
+        axes = np.eye(low.size)
+        above, below = np.isfinite(high), np.isfinite(low)
+        return cls(np.vstack([axes[above], -axes[below]]), np.concatenate([high[above], -low[below]]))
+
+    @classmethod
+    def from_vertices(cls, V: ArrayLike) -> Self:
+        """Convex hull of points (k, n), k >= 1.
+
+        Points within 1e-12 of their spread of a subspace give explicit equalities.  Qhull, in scaled coordinates.
+        """
+        points = as_array("V", V, 2)
+        if 0 in points.shape:
+            raise ValueError(f"V has shape {points.shape}; expected one or more points (none: HPolytope.empty).")
+        return cls(*rows_of_points(points))
+
+    @classmethod
+    def empty(cls, n: int) -> Self:
+        """The empty set of R^n, as ``0'x <= -1``."""
+        return cls(np.zeros((1, n)), [-1.0])
+
+    @classmethod
+    def whole_space(cls, n: int) -> Self:
+        """R^n: no rows."""
+        return cls(np.empty((0, n)), np.empty(0))
+
+    def __repr__(self) -> str:
+        equalities = f", {self.d.size} equalities" if self.d.size else ""
+        return f"HPolytope(dim={self.dim}, {self.b.size} inequalities{equalities})"
+
+    # questions
+
+    def emptiness(self) -> Emptiness:
+        """Is the set empty?  "nonempty" with a witness, "empty" with an exact certificate, or "undecided".
+
+        Decided about the floats as they are: rows that contradict each other only by rounding are empty, and a set of
+        width 1e-12 is not.  Microseconds where the set is fat or clearly empty, milliseconds of rational arithmetic
+        where it is neither.
+        """
+        return self.decided
+
+    def support(self, directions: ArrayLike) -> float | Floats:
+        """Support function ``h(c) = max {c'x : x in P}``.
+
+        Parameters
+        ----------
+        directions : array_like (n,) or (k, n)
+
+        Returns
+        -------
+        float or array (k,)
+            +inf where unbounded, -inf if the set is empty.
+
+        Raises
+        ------
+        UndecidedError
+            If a program could not be settled.
+        """
+        return support_functions.support(self, directions)
+
+    def support_points(self, directions: ArrayLike) -> SupportResult:
+        """Values, maximisers and multipliers in k directions; see `SupportResult`."""
+        return support_functions.support_points(self, directions)
+
+    def bounding_box(self) -> tuple[Floats, Floats]:
+        """Smallest box that contains the set: lower (n,) and upper (n,), infinite where unbounded.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        """
+        return support_functions.bounding_box(self)
+
+    def chebyshev(self) -> Ball:
+        """A largest ball in the set (within the affine set of the equalities): centre and radius, inf if unlimited.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        """
+        return support_functions.chebyshev(self)
+
+    def is_bounded(self) -> bool:
+        """Whether the set lies in some ball; the empty set does."""
+        return support_functions.is_bounded(self)
+
+    def affine_dim(self) -> int:
+        """Dimension of the affine hull, decided exactly: 0 for a point, -1 for the empty set."""
+        return affine_dim(self)
+
+    def contains(self, x: "ArrayLike | Rows", tol: float = 1e-9) -> bool | NDArray[np.bool_]:
+        """Whether a point (n,), each of k points (k, n), or a whole set lies inside.
+
+        Parameters
+        ----------
+        x : array_like or HPolytope
+        tol : float
+            Nonnegative distance, in the units of x: every half-space and hyperplane may be missed by that much.  The
+            test is in floats; with tol = 0 a point on the boundary may go either way.
+        """
+        slack = _tolerance(tol)
+        if isinstance(x, Rows):
+            return containment.contains_set(self, _same_space(self, x), slack)
+        points = as_array("x", x, np.ndim(np.asarray(x)))
+        if points.ndim not in (1, 2) or points.shape[-1] != self.dim:
+            raise ValueError(f"x has shape {points.shape}; expected ({self.dim},) or (k, {self.dim}).")
+        inside = containment.contains_points(self, np.atleast_2d(points), slack)
+        return bool(inside[0]) if points.ndim == 1 else inside
+
+    def equals(self, Q: Rows, tol: float = 1e-9) -> bool:
+        """Whether each set contains the other within `tol` (see `contains`)."""
+        return containment.equal_sets(self, _same_space(self, Q), _tolerance(tol))
+
+    def vertices(self) -> Floats:
+        """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
+
+        Raises
+        ------
+        UnboundedError
+            If the set is unbounded.
+        """
+        return vertices(self)
+
+    # other sets from this one
+
+    def remove_redundancy(self) -> Self:
+        """The same set by a minimal description: independent equalities and one row per facet.
+
+        A row is dropped if the others imply it to within 1e-12 of the largest |b| (outward: the result contains the
+        set).  Implicit equalities become explicit, decided exactly.
+        """
+        return type(self)(*minimal_rows(self))
+
+    def intersection(self, Q: Rows) -> Self:
+        """Points in both sets: the rows of both."""
+        _same_space(self, Q)
+        inequalities = np.vstack([self.A, Q.A]), np.concatenate([self.b, Q.b])
+        return type(self)(*inequalities, np.vstack([self.C, Q.C]), np.concatenate([self.d, Q.d]))
+
+    def product(self, Q: Rows) -> Self:
+        """Cartesian product ``{(x, y) : x in P, y in Q}``."""
+        A, C = _block_diagonal(self.A, Q.A), _block_diagonal(self.C, Q.C)
+        return type(self)(A, np.concatenate([self.b, Q.b]), C, np.concatenate([self.d, Q.d]))
+
+    def preimage(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
+        """``{x : M x + t in P}``.
+
+        Parameters
+        ----------
+        M : array_like (n, k)
+            Any matrix; the result lives in R^k.
+        t : array_like (n,), optional
+            Zero if absent.
+        """
+        matrix = as_array("M", M, 2)
+        if matrix.shape[0] != self.dim:
+            raise ValueError(f"M has shape {matrix.shape}; expected {self.dim} rows, the dimension of the set.")
+        shift = np.zeros(self.dim) if t is None else as_vector("t", t, self.dim)
+        return type(self)(self.A @ matrix, self.b - self.A @ shift, self.C @ matrix, self.d - self.C @ shift)
+
+    def outer_template(self, directions: ArrayLike) -> Self:
+        """Smallest set ``{x : T x <= h}`` with the given normals (k, n) that contains this one.
+
+        Normals along which this set is unbounded are left out.
+        """
+        normals = as_matrix("directions", directions, self.dim)
+        if not self.program.consistent or self.decided.status == "empty":
+            return type(self).empty(self.dim)
+        return type(self)(*support_functions.outer_template(self, normals))
+
+    def plot(self, ax: Any = None, dims: Sequence[int] = (0, 1), **style: Any) -> list[Any]:
+        """Draw the projection on two coordinates; returns the matplotlib artists.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            New axes if absent.
+        dims : two ints
+            The coordinates on the axes.
+        **style
+            Passed to the matplotlib patch.
+        """
+        pair = tuple(int(j) for j in dims)
+        if len(pair) != 2 or len(set(pair)) != 2 or not all(0 <= j < self.dim for j in pair):
+            raise ValueError(f"dims is {tuple(dims)}; expected two different coordinates below {self.dim}.")
+        return plotting.plot(self, ax, (pair[0], pair[1]), style)
+
+
+def _tolerance(tol: float) -> float:
+    if not tol >= 0.0:
+        raise ValueError(f"tol is {tol}; expected a nonnegative distance.")
+    return float(tol)
+
+
+def _same_space(P: Rows, Q: Rows) -> Rows:
+    if not isinstance(Q, Rows):
+        raise TypeError(f"Q is a {type(Q).__name__}; expected an HPolytope.")
+    if Q.dim != P.dim:
+        raise ValueError(f"Q has dimension {Q.dim}; expected {P.dim}, the dimension of this set.")
+    return Q
+
+
+def _block_diagonal(P: Floats, Q: Floats) -> Floats:
+    table = np.zeros((P.shape[0] + Q.shape[0], P.shape[1] + Q.shape[1]))
+    table[: P.shape[0], : P.shape[1]] = P
+    table[P.shape[0] :, P.shape[1] :] = Q
+    return table

@@ -1,0 +1,258 @@
+"""Linear programs over one set of rows: prepared once, solved by the kernel, by HiGHS, or in rationals.
+
+`Program` holds ``{x : A x <= b, C x = d}`` ready for solving: equalities eliminated (exactly), constant rows set aside,
+rows scaled by powers of two.  Small programs go to the compiled kernel, large ones to HiGHS.  An answer that is not
+clean (an iteration limit, a doubtful ray, optimality conditions violated) passes to HiGHS, then to the rational
+simplex; what none of them settles is reported as undecided, never guessed.
+"""
+
+import logging
+import threading
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import simplex_kernel as kernel
+from polytopes.affine import AffineSet, affine_set
+from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum, rounded
+from polytopes.highs import HighsProgram
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_KERNEL_VARIABLES = 40
+_KERNEL_ENTRIES = 200_000
+_CLEAN = 1e-9  # relative violation of the optimality conditions that is still accepted from HiGHS
+_THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
+
+OPTIMAL, UNBOUNDED, UNDECIDED = "optimal", "unbounded", "undecided"
+
+
+@cache
+def warm_up() -> None:
+    """Compile the kernels, or load them from the cache, so that no later call has to.
+
+    The first time on a machine takes some ten seconds, and one line on the logger ``polytopes`` says so; afterwards it
+    takes a fraction of a second.  Called on first use; call it yourself before a loop that must not be delayed.
+    """
+    announce = threading.Timer(
+        1.5, logging.getLogger("polytopes").warning, ["compiling the LP kernels: once on this machine, about 15 s"]
+    )
+    announce.daemon = True
+    announce.start()
+    try:
+        AT, b, norms = np.array([[1.0, -1.0]]), np.ones(2), np.ones(2)
+        kernel.interior(AT, b, norms, np.zeros(1), 1.0)
+        kernel.supports(AT, b, np.zeros(1), np.ones((1, 1)))
+        kernel.irredundant_naive(AT, b, np.zeros(1), 0.0)
+        kernel.irredundant_clarkson(AT, b, np.zeros(1), 0.0)
+    finally:
+        announce.cancel()
+
+
+@dataclass(frozen=True, eq=False)
+class Interior:
+    """Centre of a largest ball (n,), its radius, and multipliers (m,) that prove the radius.
+
+    `radius` is negative if the rows have no common point, and inf where the ball can grow without end.  `reliable` is
+    False if no solver finished.
+    """
+
+    point: Floats
+    radius: float
+    multipliers: Floats
+    reliable: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Maxima:
+    """Maxima of k linear forms: values (k,), points (k, n), multipliers of the rows (k, m), status (k,) of names."""
+
+    values: Floats
+    points: Floats
+    multipliers: Floats
+    status: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Rows ``A x <= b``, ``C x = d`` prepared for linear programs; build it with `prepare`.
+
+    Attributes
+    ----------
+    AT, rhs : arrays (free, kept) and (kept,)
+        Rows in the free coordinates z, scaled and transposed.
+    norms : array (kept,)
+        Norms of the scaled rows in the metric of x, within the affine set.
+    scale : array (kept,)
+        The powers of two.
+    kept : array of int
+        The rows that are not constant on the affine set.
+    violated : int or None
+        A constant row that fails, if there is one.
+    """
+
+    A: Floats
+    b: Floats
+    flat: AffineSet
+    AT: Floats
+    rhs: Floats
+    norms: Floats
+    scale: Floats
+    kept: Indices
+    violated: int | None
+
+    @property
+    def consistent(self) -> bool:
+        """Whether neither the equalities nor a constant row are contradictory by themselves."""
+        return self.flat.contradiction is None and self.violated is None
+
+    @property
+    def size(self) -> float:
+        """The size that tolerances refer to: the largest scaled |b|, or 1."""
+        return float(np.abs(self.rhs).max(initial=0.0)) or 1.0
+
+    @cached_property
+    def _small(self) -> bool:
+        return self.AT.shape[0] <= _KERNEL_VARIABLES and self.AT.size <= _KERNEL_ENTRIES
+
+    @cached_property
+    def _highs(self) -> HighsProgram:
+        return HighsProgram(np.ascontiguousarray(self.AT.T), self.rhs)
+
+    @cached_property
+    def interior(self) -> Interior:
+        """Centre and radius of a largest ball within the affine set; the program must be consistent."""
+        free, kept = self.AT.shape
+        if kept == 0:
+            return Interior(self.flat.lift(np.zeros(free)), np.inf, np.zeros(self.b.size), True)
+        # By duality a largest ball has a radius of at most max |b_i| / |a_i|, or none at all.
+        cap = 2.0 * self.size / float(self.norms.min())
+        if self._small:
+            warm_up()
+            z, radius, status, active, y = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), cap)
+            if status == kernel.OPTIMAL:
+                weights = np.zeros(kept + 1)
+                weights[active[active >= 0]] = y[active >= 0]
+                return Interior(self.flat.lift(z), _uncapped(radius, cap), self._unscaled(weights[:kept]), True)
+        return self._interior_by_highs(cap)
+
+    def _interior_by_highs(self, cap: float) -> Interior:
+        free, kept = self.AT.shape
+        rows = np.vstack([np.hstack([self.AT.T, self.norms[:, None]]), np.append(np.zeros(free), 1.0)])
+        answer = HighsProgram(rows, np.append(self.rhs, cap)).maximise(np.append(np.zeros(free), 1.0))
+        point = answer.point if answer.point.size == free + 1 else np.zeros(free + 1)
+        weights = answer.multipliers[:kept] if answer.multipliers.size == kept + 1 else np.zeros(kept)
+        unscaled = self._unscaled(np.maximum(weights, 0.0))
+        return Interior(self.flat.lift(point[:-1]), _uncapped(point[-1], cap), unscaled, answer.status == "optimal")
+
+    @property
+    def thin(self) -> bool:
+        """Whether the set is so thin (or so nearly empty) that only exact arithmetic can say that it has a point."""
+        interior = self.interior
+        return self.AT.shape[0] == 0 or not interior.reliable or interior.radius <= _THIN * self.size
+
+    def maximise(self, directions: Floats) -> Maxima:
+        """Maxima of ``directions x`` over the set, which must not be empty.
+
+        Parameters
+        ----------
+        directions : array (k, n)
+        """
+        k, free = directions.shape[0], self.AT.shape[0]
+        reduced = np.ascontiguousarray(directions @ self.flat.basis) if self.flat.pivots else directions
+        points, weights = np.zeros((k, free)), np.zeros((k, self.kept.size))
+        status = [OPTIMAL] * k if free == 0 else [UNDECIDED] * k
+        if free and self._small:
+            status = self._maximise_by_kernel(reduced, points, weights)
+        values = np.full(k, np.inf)
+        solved = [q for q in range(k) if status[q] == OPTIMAL]
+        lifted, multipliers = self.flat.lift(points), np.zeros((k, self.b.size))
+        multipliers[:, self.kept] = weights * self.scale
+        values[solved] = np.einsum("ij,ij->i", directions[solved], lifted[solved])
+        for q in range(k):
+            if status[q] == UNDECIDED:
+                status[q], values[q], lifted[q], multipliers[q] = self._maximise_carefully(directions[q], reduced[q])
+        return Maxima(values, lifted, multipliers, status)
+
+    def _maximise_by_kernel(self, reduced: Floats, points: Floats, weights: Floats) -> list[str]:
+        warm_up()
+        start = np.ascontiguousarray(self.interior.point[self.flat.free])
+        _, points[:], active, y, status = kernel.supports(self.AT, self.rhs, start, np.ascontiguousarray(reduced))
+        row, slot = np.nonzero(active >= 0)
+        weights[row, active[row, slot]] = y[row, slot]
+        names = {kernel.OPTIMAL: OPTIMAL, kernel.UNBOUNDED: UNBOUNDED}
+        return [names.get(int(code), UNDECIDED) for code in status]
+
+    def _maximise_carefully(self, direction: Floats, reduced: Floats) -> tuple[str, float, Floats, Floats]:
+        """HiGHS, accepted if the optimality conditions hold; else the rational simplex."""
+        answer = self._highs.maximise(reduced)
+        if answer.status == "optimal" and self._optimal(reduced, answer.point, answer.multipliers):
+            point = self.flat.lift(answer.point)
+            return OPTIMAL, float(direction @ point), point, self._unscaled(answer.multipliers)
+        nowhere = np.full(self.flat.dim, np.nan)
+        if affordable(*self.A.shape):
+            start = exact_feasibility(self.A, self.b, self.flat, self.interior.point)
+            if start.status == "reached":
+                outcome = exact_maximum(self.A, self.b, self.flat, direction, start.point)
+                if outcome.status == "optimal":
+                    return OPTIMAL, *rounded(outcome, self.b.size)
+                if outcome.status == "unbounded":
+                    return UNBOUNDED, np.inf, nowhere, np.zeros(self.b.size)
+        elif answer.status == "unbounded":
+            return UNBOUNDED, np.inf, nowhere, np.zeros(self.b.size)
+        return UNDECIDED, np.nan, nowhere, np.zeros(self.b.size)
+
+    def _optimal(self, c: Floats, z: Floats, y: Floats) -> bool:
+        """Primal and dual feasibility and equal objectives, to a relative 1e-9."""
+        reach = max(self.size, float(np.abs(z).max(initial=0.0)))
+        size = float(np.abs(c).max(initial=0.0)) or 1.0
+        return bool(
+            (self.AT.T @ z - self.rhs).max(initial=0.0) <= _CLEAN * reach
+            and y.min(initial=0.0) >= -_CLEAN * size
+            and np.abs(self.AT @ y - c).max(initial=0.0) <= _CLEAN * size
+            and abs(c @ z - y @ self.rhs) <= _CLEAN * size * reach
+        )
+
+    def _unscaled(self, weights: Floats) -> Floats:
+        """Multipliers of the scaled, kept rows as multipliers of the rows of A."""
+        multipliers = np.zeros(self.b.size)
+        multipliers[self.kept] = weights * self.scale
+        return multipliers
+
+
+def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
+    """Eliminate the equalities, set constant rows aside and scale the others.
+
+    Parameters
+    ----------
+    A, b, C, d : arrays (m, n), (m,), (q, n), (q,)
+    """
+    flat = affine_set(C, d)
+    rows, rhs = flat.restrict(A, b)
+    norms = np.linalg.norm(rows, axis=1)
+    constant = norms == 0.0
+    failing = np.flatnonzero(constant & (rhs < 0.0))
+    kept = np.flatnonzero(~constant)
+    scale = np.ldexp(1.0, -np.frexp(norms[kept])[1])
+    rows = rows[kept] * scale[:, None]
+    lengths = _metric_norms(rows, flat)
+    violated = int(failing[0]) if failing.size else None
+    AT = np.ascontiguousarray(rows.T)
+    return Program(A, b, flat, AT, rhs[kept] * scale, lengths, scale, kept, violated)
+
+
+def _uncapped(radius: float, cap: float) -> float:
+    return float(radius) if radius < 0.99 * cap else np.inf
+
+
+def _metric_norms(rows: Floats, flat: AffineSet) -> Floats:
+    """Norms of the rows (in free coordinates) measured in x, along the affine set."""
+    if not flat.pivots:
+        return np.linalg.norm(rows, axis=1)
+    if not flat.free:
+        return np.ones(len(rows))
+    gram = np.linalg.cholesky(flat.basis.T @ flat.basis)
+    return np.linalg.norm(np.linalg.solve(gram, rows.T), axis=0)

@@ -1,0 +1,80 @@
+"""The rows of an H-polytope: validated once, read-only, with what is derived from them kept beside them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes.emptiness import Emptiness, decide_emptiness
+from polytopes.errors import as_array, as_matrix, as_vector
+from polytopes.linear_program import Program, prepare
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rows:
+    """``{x : A x <= b, C x = d}`` as read-only float arrays.
+
+    Parameters
+    ----------
+    A, b : array_like (m, n) and (m,)
+    C, d : array_like (q, n) and (q,), optional
+        Explicit equalities.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an array is not numeric and finite, or a shape does not fit.
+    """
+
+    A: Floats
+    b: Floats
+    C: Floats
+    d: Floats
+
+    def __init__(
+        self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None
+    ) -> None:
+        rows = as_array("A", A, 2)
+        m, n = rows.shape
+        if n == 0:
+            raise ValueError(f"A has shape {rows.shape}; expected at least one column. Use shape (0, n) for no rows.")
+        rhs = as_array("b", b, 1)
+        if rhs.size != m:
+            raise ValueError(f"b has shape {rhs.shape}; expected ({m},), one entry per row of A.")
+        if (C is None) != (d is None):
+            raise ValueError("C and d must be given together: the equalities are C x = d.")
+        fixed = np.empty((0, n)) if C is None else as_matrix("C", C, n)
+        values = np.empty(0) if d is None else as_array("d", d, 1)
+        if values.size != fixed.shape[0]:
+            raise ValueError(f"d has shape {values.shape}; expected ({fixed.shape[0]},), one entry per row of C.")
+        for name, array in zip("AbCd", (rows, rhs, fixed, values), strict=True):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def dim(self) -> int:
+        """Dimension n of the space."""
+        return int(self.A.shape[1])
+
+    @cached_property
+    def program(self) -> Program:
+        """The rows prepared for linear programs."""
+        return prepare(self.A, self.b, self.C, self.d)
+
+    @cached_property
+    def decided(self) -> Emptiness:
+        """Emptiness of the rows, decided once."""
+        return decide_emptiness(self, self.program)
+
+    def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
+        """The same equalities with other inequalities."""
+        return type(self)(A, b, self.C, self.d)
+
+
+def as_point(P: Rows, x: ArrayLike) -> Floats:
+    """A point of the space of P; ValueError otherwise."""
+    return as_vector("x", x, P.dim)

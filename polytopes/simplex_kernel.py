@@ -1,0 +1,538 @@
+"""Compiled dense primal simplex for many small programs over one polytope.
+
+The program is ``max c'x`` subject to ``A x <= b`` with x free (the inequality form), for few variables and many rows.
+A basis is a set of d active rows; a slot of the basis may instead hold an *artificial* row ``x_j`` free, which leaves
+as soon as it has a price.  The inverse of the active rows is kept as a dense d x d array whose k-th row is the edge
+that opens when the k-th active row is released.
+
+Pricing is exact steepest edge; the ratio test is Harris' (two passes, largest pivot), with Bland's rule after a run of
+degenerate steps.  A finished vertex is recomputed from its active rows, and small infeasibilities left by the Harris
+tolerance are removed by dual simplex steps, so that an optimum is a true vertex, not one displaced by a tolerance.
+
+Rows arrive scaled by powers of two, with Euclidean norms in [1/2, 2), and transposed: ``AT`` is (d, m), so that the
+loops over rows are contiguous.  Everything that is compiled together lives in this file, because a cached caller does
+not notice a change of a callee in another file.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+OPTIMAL, STOPPED, UNBOUNDED, AMBIGUOUS, LIMIT = 0, 1, 2, 3, 4
+
+_PIVOT = 1e-9  # rates below are masked before the ratio test
+_RAY = 1e-13  # no rate above this: the edge is a ray
+_PRICE = 1e-12  # relative reduced cost that still counts as zero
+_HARRIS = 1e-11  # ratio-test tolerance, relative to the size of b
+_REFACTOR = 40  # pivots between two fresh inverses
+_EPS = 2.220446049250313e-16
+_FAST = {"nnan", "nsz", "reassoc", "contract"}
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _slacks(AT: Matrix, b: Vector, x: Vector, s: Vector) -> None:
+    """s = b - A x."""
+    d, m = AT.shape
+    s[:] = b
+    for j in range(d):
+        xj = x[j]
+        for i in range(m):
+            s[i] -= AT[j, i] * xj
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _settle(AT: Matrix, b: Vector, x: Vector, s: Vector, W: Index, Q: Matrix) -> None:
+    """One Newton step of x onto its active rows, then fresh slacks."""
+    d = x.shape[0]
+    for k in range(d):
+        i = W[k]
+        if i >= 0:
+            residual = b[i]
+            for j in range(d):
+                residual -= AT[j, i] * x[j]
+            for j in range(d):
+                x[j] += Q[k, j] * residual
+    _slacks(AT, b, x, s)
+    for k in range(d):
+        if W[k] >= 0:
+            s[W[k]] = 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _invert_basis(AT: Matrix, W: Index, Q: Matrix, work: Matrix) -> bool:
+    """Q = inverse of the active rows, transposed (Gauss-Jordan, partial pivoting); False if singular."""
+    d = W.shape[0]
+    for k in range(d):
+        for j in range(d):
+            work[k, j] = AT[j, W[k]] if W[k] >= 0 else (1.0 if j == -1 - W[k] else 0.0)
+            work[k, d + j] = 1.0 if j == k else 0.0
+    for c in range(d):
+        best = c
+        for k in range(c + 1, d):
+            if abs(work[k, c]) > abs(work[best, c]):
+                best = k
+        if abs(work[best, c]) < _RAY:
+            return False
+        if best != c:
+            for j in range(2 * d):
+                work[c, j], work[best, j] = work[best, j], work[c, j]
+        inverse = 1.0 / work[c, c]
+        for j in range(c, 2 * d):
+            work[c, j] *= inverse
+        for k in range(d):
+            factor = work[k, c]
+            if k != c and factor != 0.0:
+                for j in range(c, 2 * d):
+                    work[k, j] -= factor * work[c, j]
+    for j in range(d):
+        for k in range(d):
+            Q[k, j] = work[j, d + k]
+    return True
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _exchange(Q: Matrix, alpha: Vector, k: int) -> None:
+    """Update the edges after the row with coordinates alpha (in the old basis) took slot k."""
+    d = Q.shape[0]
+    inverse = 1.0 / alpha[k]
+    for j in range(d):
+        Q[k, j] *= inverse
+    for q in range(d):
+        if q != k and alpha[q] != 0.0:
+            factor = alpha[q]
+            for j in range(d):
+                Q[q, j] -= factor * Q[k, j]
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _coordinates(AT: Matrix, i: int, Q: Matrix, alpha: Vector) -> None:
+    """alpha: row i as a combination of the active rows."""
+    d = Q.shape[0]
+    for k in range(d):
+        total = 0.0
+        for j in range(d):
+            total += AT[j, i] * Q[k, j]
+        alpha[k] = total
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _price(c: Vector, size: float, W: Index, Q: Matrix, y: Vector, bland: bool) -> int:
+    """Multipliers y of the active rows and the slot to release (-1: optimal)."""
+    d = W.shape[0]
+    slot, best, first = -1, 0.0, np.int64(1) << 60
+    for k in range(d):
+        yk, square = 0.0, 0.0
+        for j in range(d):
+            yk += c[j] * Q[k, j]
+            square += Q[k, j] * Q[k, j]
+        y[k] = yk
+        gain = abs(yk) if W[k] < 0 else -yk
+        if gain > _PRICE * size * np.sqrt(square):
+            if bland:
+                if W[k] < first:
+                    first, slot = W[k], k
+            else:
+                merit = gain * gain / square * (1e6 if W[k] < 0 else 1.0)
+                if merit > best:
+                    best, slot = merit, k
+    return slot
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _blocking_row(s: Vector, rate: Vector, tolerance: float, bland: bool) -> int:
+    """Row that stops a move of rates `rate` (-1: none with a pivot above the mask)."""
+    m = s.shape[0]
+    steepest = 0.0
+    for i in range(m):
+        a = rate[i] if rate[i] > _PIVOT else 0.0
+        steepest = max(steepest, a / (max(s[i], 0.0) + tolerance))
+    if steepest <= 0.0:
+        return -1
+    step = 1.0 / steepest
+    if bland:
+        for i in range(m):
+            if rate[i] > _PIVOT and s[i] <= step * rate[i]:
+                return i
+    pivot = 0.0
+    for i in range(m):
+        pivot = max(pivot, rate[i] if s[i] <= step * rate[i] else 0.0)
+    for i in range(m):
+        if rate[i] == pivot and s[i] <= step * rate[i]:
+            return i
+    return -1
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _ascend(
+    AT: Matrix, b: Vector, c: Vector, x: Vector, s: Vector, W: Index, Q: Matrix, y: Vector, scale: float, stop: float
+) -> int:
+    """Primal simplex from the feasible state (x, s, W, Q); leaves the multipliers in y."""
+    d, m = AT.shape
+    p, alpha, rate, work = np.empty(d), np.empty(d), np.empty(m), np.empty((d, 2 * d))
+    size = 0.0
+    for j in range(d):
+        size += c[j] * c[j]
+    size = np.sqrt(size)
+    degenerate, age = 0, 0
+    for _ in range(50 * (d + 1) + m):
+        value = 0.0
+        for j in range(d):
+            value += c[j] * x[j]
+        if value > stop:
+            return STOPPED
+        bland = degenerate > 3 * d
+        slot = _price(c, size, W, Q, y, bland)
+        if slot < 0:
+            return OPTIMAL
+        sign = 1.0 if W[slot] < 0 and y[slot] > 0.0 else -1.0
+        length = 0.0
+        for j in range(d):
+            length += Q[slot, j] * Q[slot, j]
+        sign /= np.sqrt(length)
+        for j in range(d):
+            p[j] = sign * Q[slot, j]
+        for i in range(m):
+            rate[i] = AT[0, i] * p[0]
+        for j in range(1, d):
+            pj = p[j]
+            for i in range(m):
+                rate[i] += AT[j, i] * pj
+        for k in range(d):
+            if W[k] >= 0:
+                rate[W[k]] = 0.0
+        row = _blocking_row(s, rate, _HARRIS * scale, bland)
+        if row < 0:
+            largest = 0.0
+            for i in range(m):
+                largest = max(largest, rate[i])
+            return UNBOUNDED if largest <= _RAY else AMBIGUOUS
+        step = max(s[row], 0.0) / rate[row]
+        degenerate = degenerate + 1 if step <= 1e-13 * scale else 0
+        for j in range(d):
+            x[j] += step * p[j]
+        for i in range(m):
+            s[i] -= step * rate[i]
+        s[row] = 0.0
+        _coordinates(AT, row, Q, alpha)
+        _exchange(Q, alpha, slot)
+        left = W[slot]
+        W[slot] = row
+        if left >= 0:
+            slack = b[left]
+            for j in range(d):
+                slack -= AT[j, left] * x[j]
+            s[left] = max(slack, 0.0)
+        age += 1
+        if age >= _REFACTOR:
+            age = 0
+            if not _invert_basis(AT, W, Q, work):
+                return LIMIT
+            _settle(AT, b, x, s, W, Q)
+    return LIMIT
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _repair(AT: Matrix, b: Vector, x: Vector, s: Vector, W: Index, Q: Matrix, y: Vector, scale: float) -> int:
+    """Dual simplex steps from an optimal basis whose vertex is infeasible by about the Harris tolerance."""
+    d, m = AT.shape
+    alpha, work = np.empty(d), np.empty((d, 2 * d))
+    for attempt in range(2 * d + 10):
+        _settle(AT, b, x, s, W, Q)
+        reach = scale
+        for j in range(d):
+            reach = max(reach, abs(x[j]))
+        worst = 0.0
+        for i in range(m):
+            worst = min(worst, s[i])
+        if worst >= -64.0 * _EPS * reach:
+            return OPTIMAL
+        if attempt == d and not _invert_basis(AT, W, Q, work):
+            return LIMIT
+        row = 0
+        while s[row] != worst:
+            row += 1
+        _coordinates(AT, row, Q, alpha)
+        slot, ratio = -1, np.inf
+        for k in range(d):
+            if W[k] < 0:
+                if abs(alpha[k]) > _PIVOT:
+                    slot, ratio = k, -1.0
+            elif alpha[k] > _PIVOT and max(y[k], 0.0) < ratio * alpha[k]:
+                slot, ratio = k, max(y[k], 0.0) / alpha[k]
+        if slot < 0:
+            return AMBIGUOUS
+        theta = y[slot] / alpha[slot]
+        for k in range(d):
+            y[k] -= theta * alpha[k]
+        y[slot] = theta
+        _exchange(Q, alpha, slot)
+        W[slot] = row
+    return LIMIT
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _optimise(
+    AT: Matrix, b: Vector, c: Vector, x: Vector, s: Vector, W: Index, Q: Matrix, y: Vector, scale: float
+) -> int:
+    """Ascend, put the vertex exactly on its rows, remove the Harris slack."""
+    status = _ascend(AT, b, c, x, s, W, Q, y, scale, np.inf)
+    if status == OPTIMAL:
+        status = _repair(AT, b, x, s, W, Q, y, scale)
+    return status
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _start(AT: Matrix, b: Vector, x0: Vector, x: Vector, s: Vector, W: Index, Q: Matrix) -> None:
+    """State at the feasible point x0: every slot artificial."""
+    d = AT.shape[0]
+    Q[:, :] = 0.0
+    for j in range(d):
+        x[j] = x0[j]
+        W[j] = -1 - j
+        Q[j, j] = 1.0
+    _slacks(AT, b, x, s)
+
+
+@njit(cache=True)
+def _scale_of(b: Vector) -> float:
+    """Size that tolerances refer to: the largest |b| (1 for a cone)."""
+    largest = 0.0
+    for i in range(b.shape[0]):
+        largest = max(largest, abs(b[i]))
+    return largest if largest > 0.0 else 1.0
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def interior(
+    AT: Matrix, b: Vector, norms: Vector, x0: Vector, cap: float
+) -> tuple[Vector, float, int, Index, Vector]:
+    """Largest ball ``a_i'x + |a_i| r <= b_i`` with ``r <= cap``.
+
+    Parameters
+    ----------
+    AT, b : arrays (d, m) and (m,)
+        Scaled rows, transposed.
+    norms : array (m,)
+        Euclidean norms of the rows.
+    x0 : array (d,)
+        Any starting point; it need not be feasible.
+    cap : float
+        Upper limit of the radius; keeps the program bounded on unbounded sets.
+
+    Returns
+    -------
+    x, r, status, active, multipliers
+        Centre (d,), radius (negative if the rows have no common point), status, the d + 1 active rows (m stands for
+        the cap, negative for an artificial row) and their multipliers.  With r < 0 the multipliers combine the rows to
+        ``0'x <= r``: Farkas' multipliers.
+    """
+    d, m = AT.shape
+    lifted = np.empty((d + 1, m + 1))
+    lifted[:d, :m] = AT
+    lifted[d, :m] = norms
+    lifted[:d, m] = 0.0
+    lifted[d, m] = 1.0
+    rhs = np.empty(m + 1)
+    rhs[:m] = b
+    rhs[m] = cap
+    x, s, y = np.empty(d + 1), np.empty(m + 1), np.zeros(d + 1)
+    W, Q = np.empty(d + 1, np.int64), np.empty((d + 1, d + 1))
+    origin = np.zeros(d + 1)
+    origin[:d] = x0
+    _start(lifted, rhs, origin, x, s, W, Q)
+    radius = cap
+    for i in range(m):
+        radius = min(radius, s[i] / norms[i])
+    origin[d] = radius
+    _start(lifted, rhs, origin, x, s, W, Q)
+    c = np.zeros(d + 1)
+    c[d] = 1.0
+    status = _optimise(lifted, rhs, c, x, s, W, Q, y, _scale_of(rhs))
+    return x[:d].copy(), float(x[d]), status, W, y
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _nearest_order(directions: Matrix) -> Index:
+    """Greedy chain through the directions by angle, so that neighbours share most of their basis."""
+    k, d = directions.shape
+    order = np.arange(k)
+    if k > 128:
+        return order
+    units = np.empty((k, d))
+    for i in range(k):
+        square = 0.0
+        for j in range(d):
+            square += directions[i, j] * directions[i, j]
+        inverse = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
+        for j in range(d):
+            units[i, j] = directions[i, j] * inverse
+    for i in range(1, k):
+        best, cosine = i, -2.0
+        for q in range(i, k):
+            total = 0.0
+            for j in range(d):
+                total += units[order[i - 1], j] * units[order[q], j]
+            if total > cosine:
+                best, cosine = q, total
+        order[i], order[best] = order[best], order[i]
+    return order
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def supports(
+    AT: Matrix, b: Vector, x0: Vector, directions: Matrix
+) -> tuple[Vector, Matrix, Index, Matrix, Index]:
+    """Support function in k directions, each program started from the vertex of its neighbour.
+
+    Parameters
+    ----------
+    AT, b : arrays (d, m) and (m,)
+        Scaled rows, transposed.
+    x0 : array (d,)
+        A feasible point.
+    directions : array (k, d)
+
+    Returns
+    -------
+    values, points, active, multipliers, status
+        Arrays (k,), (k, d), (k, d), (k, d), (k,).  Values, points and multipliers mean something only where the status
+        is `OPTIMAL`; the value is inf where it is `UNBOUNDED`.
+    """
+    d, m = AT.shape
+    k = directions.shape[0]
+    values, points = np.empty(k), np.empty((k, d))
+    active, multipliers, status = np.empty((k, d), np.int64), np.zeros((k, d)), np.empty(k, np.int64)
+    x, s, W, Q = np.empty(d), np.empty(m), np.empty(d, np.int64), np.empty((d, d))
+    scale = _scale_of(b)
+    _start(AT, b, x0, x, s, W, Q)
+    for q in _nearest_order(directions):
+        c, y = directions[q], multipliers[q]
+        status[q] = _optimise(AT, b, c, x, s, W, Q, y, scale)
+        values[q] = np.inf if status[q] == UNBOUNDED else 0.0
+        if status[q] == OPTIMAL:
+            values[q] = 0.0
+            for j in range(d):
+                values[q] += c[j] * x[j]
+        points[q] = x
+        active[q] = W
+        if status[q] in (LIMIT, AMBIGUOUS):
+            _start(AT, b, x0, x, s, W, Q)
+    return values, points, active, multipliers, status
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _exceeds(AT: Matrix, b: Vector, x0: Vector, c: Vector, limit: float, x: Vector) -> int:
+    """Whether ``c'x`` exceeds `limit` somewhere: OPTIMAL means no; STOPPED (with such an x) and UNBOUNDED mean yes."""
+    d, m = AT.shape
+    s, y, W, Q = np.empty(m), np.empty(d), np.empty(d, np.int64), np.empty((d, d))
+    _start(AT, b, x0, x, s, W, Q)
+    return _ascend(AT, b, c, x, s, W, Q, y, _scale_of(b), limit)
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def irredundant_naive(AT: Matrix, b: Vector, x0: Vector, tolerance: float) -> tuple[Index, Index]:
+    """One program per row against all rows still kept, that row relaxed.
+
+    Parameters
+    ----------
+    AT, b : arrays (d, m) and (m,)
+        Scaled rows, transposed.
+    x0 : array (d,)
+        An interior point.
+    tolerance : float
+        A row is dropped if the others keep ``a_i'x <= b_i + tolerance``.
+
+    Returns
+    -------
+    keep, doubtful : arrays (m,) of 0 and 1
+        A doubtful row is one whose program did not finish.
+    """
+    d, m = AT.shape
+    keep, doubtful = np.ones(m, np.int64), np.zeros(m, np.int64)
+    relaxed, x = b.copy(), np.empty(d)
+    room = _scale_of(b)
+    for i in range(m):
+        relaxed[i] = b[i] + room
+        status = _exceeds(AT, relaxed, x0, AT[:, i].copy(), b[i] + tolerance, x)
+        relaxed[i] = b[i]
+        if status == OPTIMAL:
+            keep[i] = 0
+            relaxed[i] = 1e3 * room + 1e3 * abs(b[i])
+        elif status in (AMBIGUOUS, LIMIT):
+            doubtful[i] = 1
+    return keep, doubtful
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _first_hit(AT: Matrix, s0: Vector, p: Vector) -> tuple[int, bool]:
+    """Row that the ray from x0 along p meets first (-1: none), and whether another row is met about there."""
+    d, m = AT.shape
+    row, first, second = -1, np.inf, np.inf
+    for i in range(m):
+        rate = 0.0
+        for j in range(d):
+            rate += AT[j, i] * p[j]
+        if rate * first > s0[i]:
+            row, first, second = i, s0[i] / rate, first
+        elif rate * second > s0[i]:
+            second = s0[i] / rate
+    return row, second <= first * (1.0 + 1e-9)
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def irredundant_clarkson(AT: Matrix, b: Vector, x0: Vector, tolerance: float) -> tuple[Index, Index]:
+    """Clarkson's method: programs only over rows already known to be facets; a violation finds a new facet by a ray.
+
+    Parameters and tolerance as in `irredundant_naive`.
+
+    Returns
+    -------
+    keep, doubtful : arrays (m,) of 0 and 1
+        Doubtful rows are kept but were not proved to be facets (a ray met several rows at once, or a program did not
+        finish).
+    """
+    d, m = AT.shape
+    state = np.zeros(m, np.int64)  # 0 open, 1 kept, 2 redundant
+    doubtful = np.zeros(m, np.int64)
+    s0, p, x = np.empty(m), np.empty(d), np.empty(d)
+    _slacks(AT, b, x0, s0)
+    for i in range(m):
+        if state[i] == 0:
+            for j in range(d):
+                p[j] = AT[j, i]
+            row, tie = _first_hit(AT, s0, p)
+            if row >= 0 and not tie:
+                state[row] = 1
+    facets, values = np.empty((d, m)), np.empty(m)
+    n = 0
+    for i in range(m):
+        if state[i] == 1:
+            facets[:, n] = AT[:, i]
+            values[n] = b[i]
+            n += 1
+    system, rhs = np.ascontiguousarray(facets[:, :n]), values[:n].copy()
+    for i in range(m):
+        c = AT[:, i].copy()
+        while state[i] == 0:
+            status = _exceeds(system, rhs, x0, c, b[i] + tolerance, x)
+            if status == OPTIMAL:
+                state[i] = 2
+                continue
+            p[:] = x - x0 if status == STOPPED else c
+            row, tie = _first_hit(AT, s0, p)
+            if tie or row < 0 or state[row] != 0:
+                row = i
+                doubtful[i] = 1
+            state[row] = 1
+            facets[:, n] = AT[:, row]
+            values[n] = b[row]
+            n += 1
+            system, rhs = np.ascontiguousarray(facets[:, :n]), values[:n].copy()
+    keep = np.zeros(m, np.int64)
+    for i in range(m):
+        keep[i] = 1 if state[i] == 1 else 0
+    return keep, doubtful

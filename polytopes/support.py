@@ -1,0 +1,161 @@
+"""Support function, support points and what follows from them: bounding box, boundedness, largest ball, template.
+
+The support function of P is ``h_P(c) = max {c'x : x in P}``: +inf where P is unbounded along c, -inf if P is empty.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes.errors import EmptySetError, UndecidedError, as_array
+from polytopes.linear_program import UNDECIDED, Maxima
+from polytopes.rows import Rows
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SupportResult:
+    """Support in k directions.
+
+    Attributes
+    ----------
+    values : array (k,)
+        +inf where unbounded, -inf if the set is empty.
+    points : array (k, n)
+        A maximiser per direction (a vertex, if the set has one); NaN where there is none.
+    multipliers : array (k, m)
+        Nonnegative multipliers of the rows of A; with `equality_multipliers` they combine the rows to
+        ``c'x <= value`` (weak duality), up to rounding.
+    equality_multipliers : array (k, q)
+    """
+
+    values: Floats
+    points: Floats
+    multipliers: Floats
+    equality_multipliers: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Ball:
+    """A largest ball inside a set: centre (n,) and radius; the radius is inf if it can grow without end.
+
+    The ball lies in the affine set of the explicit equalities.
+    """
+
+    centre: Floats
+    radius: float
+
+
+def known_nonempty(P: Rows) -> bool:
+    """Whether P has a point.
+
+    Raises
+    ------
+    UndecidedError
+        If that could not be decided.
+    """
+    if P.program.consistent and not P.program.thin and P.program.interior.radius > 0.0:
+        return True
+    if P.decided.status == "undecided":
+        raise UndecidedError(f"cannot tell whether the set is empty: {P.decided.reason}")
+    return P.decided.status == "nonempty"
+
+
+def maxima(P: Rows, directions: Floats) -> Maxima | None:
+    """Maxima of the linear forms over P; None if P is empty.  UndecidedError if one could not be found."""
+    if not known_nonempty(P):
+        return None
+    result = P.program.maximise(directions)
+    if UNDECIDED in result.status:
+        k = result.status.index(UNDECIDED)
+        raise UndecidedError(f"no solver settled the support in direction {k}: {directions[k].tolist()}")
+    return result
+
+
+def _directions(P: Rows, directions: ArrayLike) -> Floats:
+    raw = np.asarray(directions)
+    array = as_array("directions", directions, 1 if raw.ndim == 1 else 2)
+    if array.shape[-1] != P.dim:
+        raise ValueError(f"directions has shape {array.shape}; expected ({P.dim},) or (k, {P.dim}).")
+    return array
+
+
+def support(P: Rows, directions: ArrayLike) -> float | Floats:
+    """``h_P(c)`` for one direction (n,) or a batch (k, n): a float or an array (k,)."""
+    array = _directions(P, directions)
+    batch = np.atleast_2d(array)
+    result = maxima(P, batch)
+    values = np.full(len(batch), -np.inf) if result is None else result.values
+    return float(values[0]) if array.ndim == 1 else values
+
+
+def support_points(P: Rows, directions: ArrayLike) -> SupportResult:
+    """Values, points and multipliers for one direction (n,) or a batch (k, n)."""
+    batch = np.atleast_2d(_directions(P, directions))
+    result = maxima(P, batch)
+    k, q = len(batch), P.C.shape[0]
+    if result is None:
+        nowhere = np.full((k, P.dim), np.nan)
+        return SupportResult(np.full(k, -np.inf), nowhere, np.zeros((k, P.b.size)), np.zeros((k, q)))
+    finite = np.isfinite(result.values)
+    points = np.where(finite[:, None], result.points, np.nan)
+    multipliers = np.where(finite[:, None], result.multipliers, 0.0)
+    fixed = np.zeros((k, q))
+    if q and finite.any():
+        remainder = batch[finite] - multipliers[finite] @ P.A
+        fixed[finite] = np.linalg.lstsq(P.C.T, remainder.T, rcond=None)[0].T
+    return SupportResult(result.values, points, multipliers, fixed)
+
+
+def bounding_box(P: Rows) -> tuple[Floats, Floats]:
+    """Smallest box that contains P: lower (n,) and upper (n,), infinite where P is unbounded.
+
+    Raises
+    ------
+    EmptySetError
+        If P is empty.
+    """
+    axes = np.eye(P.dim)
+    result = maxima(P, np.vstack([axes, -axes]))
+    if result is None:
+        raise EmptySetError("the empty set has no bounding box; ask emptiness() first.")
+    return -result.values[P.dim :], result.values[: P.dim]
+
+
+def is_bounded(P: Rows) -> bool:
+    """Whether P lies in a ball (the empty set does): its support along the 2 n axes is finite."""
+    axes = np.eye(P.dim)
+    result = maxima(P, np.vstack([axes, -axes]))
+    return result is None or bool(np.isfinite(result.values).all())
+
+
+def chebyshev(P: Rows) -> Ball:
+    """A largest ball ``{x : |x - centre| <= radius}`` inside P, within the affine set of the equalities.
+
+    Raises
+    ------
+    EmptySetError
+        If P is empty.
+    UndecidedError
+        If no solver settled it.
+    """
+    if not known_nonempty(P):
+        raise EmptySetError("the empty set has no largest ball; ask emptiness() first.")
+    if not P.program.flat.free:
+        return Ball(P.program.flat.point.copy(), 0.0)
+    interior = P.program.interior
+    if not interior.reliable:
+        raise UndecidedError("no solver found a largest ball.")
+    return Ball(interior.point.copy(), max(interior.radius, 0.0))
+
+
+def outer_template(P: Rows, directions: Floats) -> tuple[Floats, Floats]:
+    """Rows ``T x <= h_P(T)`` of the smallest polytope with the given normals that contains P.
+
+    Directions in which P is unbounded give no row.
+    """
+    values = np.atleast_1d(support(P, directions))
+    finite = np.isfinite(values)
+    return directions[finite], values[finite]

@@ -1,0 +1,173 @@
+"""Emptiness against an exact oracle; certificates that verify and tampered ones that do not."""
+
+import json
+
+import numpy as np
+import ppl
+import pytest
+from flint import fmpq
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_programs import KINDS, many
+
+from polytopes import Certificate, HPolytope, UndecidedError
+from polytopes import simplex_kernel as kernel
+from polytopes.exact import refutes
+from polytopes.highs import HighsOutcome, HighsProgram
+
+
+def exactly_empty(P: HPolytope) -> bool:
+    """The Parma library's answer, on the floats as rationals."""
+    system = ppl.Constraint_System()
+    x = [ppl.Variable(j) for j in range(P.dim)]
+    system.insert(0 * x[-1] <= 0)
+    for rows, rhs, equal in ((P.A, P.b, False), (P.C, P.d, True)):
+        for row, value in zip(rows, rhs, strict=True):
+            ratios = [v.as_integer_ratio() for v in [*row.tolist(), float(value)]]
+            common = max(q for _, q in ratios)  # denominators are powers of two
+            *coefficients, constant = [p * (common // q) for p, q in ratios]
+            form = sum((c * v for c, v in zip(coefficients, x, strict=True)), 0 * x[0])
+            system.insert(form == constant if equal else form <= constant)
+    return bool(ppl.C_Polyhedron(system).is_empty())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_answers_are_those_of_the_exact_oracle(kind: str) -> None:
+    for k, (_, A, b) in enumerate(many(kind, 400 if kind in ("integer", "degenerate") else 100)):
+        P = HPolytope(A, b)
+        answer = P.emptiness()
+        assert answer.status == ("empty" if exactly_empty(P) else "nonempty"), f"{kind} {k}"
+        if answer.certificate is not None:
+            assert answer.certificate.verify(P)
+        if answer.witness is not None:
+            assert P.contains(answer.witness)
+
+
+@st.composite
+def integer_systems(draw: st.DrawFn) -> HPolytope:
+    n, m, q = draw(st.integers(1, 4)), draw(st.integers(0, 9)), draw(st.integers(0, 3))
+    entries = st.integers(-2, 2)
+    A = draw(st.lists(st.lists(entries, min_size=n, max_size=n), min_size=m, max_size=m))
+    C = draw(st.lists(st.lists(entries, min_size=n, max_size=n), min_size=q, max_size=q))
+    b = draw(st.lists(st.integers(-1, 2), min_size=m, max_size=m))
+    d = draw(st.lists(entries, min_size=q, max_size=q))
+    return HPolytope(np.reshape(A, (m, n)), np.array(b, float), np.reshape(C, (q, n)), np.array(d, float))
+
+
+@settings(max_examples=300, deadline=None)
+@given(integer_systems())
+def test_integer_systems_with_equalities(P: HPolytope) -> None:
+    answer = P.emptiness()
+    assert answer.status == ("empty" if exactly_empty(P) else "nonempty")
+    assert answer.certificate is None or answer.certificate.verify(P)
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-7, 1e-8, 1e-9, 1e-12, 0.0])
+def test_thin_sets_are_not_empty(width: float) -> None:
+    assert HPolytope.box([0.0, 0.0, 0.0], [1.0, width, 1.0]).emptiness().status == "nonempty"
+    skew = HPolytope([[0.3, 0.1], [-0.3, -0.1], [1.0, 0.0], [-1.0, 0.0]], [0.2, width - 0.2, 1.0, 1.0])
+    assert skew.emptiness().status == "nonempty"
+
+
+@pytest.mark.parametrize("overlap", [1e-6, 1e-9, 1e-12, 1e-16])
+def test_barely_empty_sets_are_empty_with_a_proof(overlap: float) -> None:
+    P = HPolytope([[1.0, 1.0], [-1.0, 0.0], [0.0, -1.0]], [-overlap, 0.0, 0.0])
+    answer = P.emptiness()
+    assert answer.status == "empty"
+    assert answer.certificate is not None
+    assert answer.certificate.verify(P)
+    assert answer.certificate.gap(P) == pytest.approx(overlap / 3)
+
+
+def test_contradictory_and_redundant_equalities() -> None:
+    box = np.vstack([np.eye(2), -np.eye(2)]), np.ones(4)
+    assert HPolytope(*box, [[1, 1], [2, 2]], [0.5, 1.0]).emptiness().status == "nonempty"
+    P = HPolytope(*box, [[1, 1], [2, 2]], [0.5, 1.5])
+    certificate = P.emptiness().certificate
+    assert certificate is not None
+    assert certificate.verify(P)
+    assert HPolytope(*box, [[1, 1]], [3.0]).emptiness().status == "empty"
+    assert HPolytope(*box, [[1e-8, 0]], [1e-8]).emptiness().status == "nonempty"
+
+
+def proven_empty() -> tuple[HPolytope, Certificate]:
+    P = HPolytope(
+        [[0.1, 0.7, 0.3], [0.2, -0.9, 0.1], [-0.4, 0.1, -0.3], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+        [0.3, 0.2, -3.1, 1.0, 1.0],
+        [[0.3, 0.3, -0.7]],
+        [0.1],
+    )
+    certificate = P.emptiness().certificate
+    assert certificate is not None
+    return P, certificate
+
+
+def test_every_tampered_number_is_noticed() -> None:
+    P, proof = proven_empty()
+    assert proof.verify(P)
+    tiny = fmpq(1, 10**30)
+    for i in proof.inequality:
+        assert not Certificate({**proof.inequality, i: proof.inequality[i] + tiny}, proof.equality).verify(P)
+        assert not Certificate({**proof.inequality, i: -proof.inequality[i]}, proof.equality).verify(P)
+    for k in proof.equality:
+        assert not Certificate(proof.inequality, {**proof.equality, k: proof.equality[k] - tiny}).verify(P)
+    assert not Certificate({}, {}).verify(P)
+    assert not Certificate({**proof.inequality, 17: fmpq(1)}, proof.equality).verify(P)
+    assert not Certificate({**proof.inequality, -1: fmpq(0)}, proof.equality).verify(P)
+
+
+def test_a_proof_of_one_set_does_not_hold_for_another() -> None:
+    P, proof = proven_empty()
+    for i in proof.inequality:
+        A = P.A.copy()
+        A[i, 0] = np.nextafter(A[i, 0], 2.0)
+        assert not proof.verify(HPolytope(A, P.b, P.C, P.d))
+    assert not proof.verify(HPolytope(P.A, P.b + 100.0, P.C, P.d))
+
+
+def test_certificates_survive_json() -> None:
+    P, proof = proven_empty()
+    copy = Certificate.from_dict(json.loads(json.dumps(proof.to_dict())))
+    assert copy == proof
+    assert copy.verify(P)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [{}, {"inequality": {}}, {"inequality": 3, "equality": {}}, {"inequality": {"0": "0.5"}, "equality": {}},
+     {"inequality": {"0": "1/0"}, "equality": {}}, {"inequality": {"x": "1/2"}, "equality": {}}],
+)  # fmt: skip
+def test_malformed_certificates_are_refused(data: dict) -> None:
+    with pytest.raises(ValueError, match="certificate"):
+        Certificate.from_dict(data)
+
+
+def test_a_failed_solver_is_never_an_empty_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    interior = kernel.interior
+
+    def failing(*arguments: np.ndarray) -> tuple:
+        x, _, _, active, y = interior(*arguments)
+        return x + 100.0, -1.0, kernel.LIMIT, active, y
+
+    def silent(self: HighsProgram, c: np.ndarray) -> HighsOutcome:
+        return HighsOutcome("infeasible", float("nan"), np.empty(0), np.empty(0))
+
+    monkeypatch.setattr(kernel, "interior", failing)
+    monkeypatch.setattr(HighsProgram, "maximise", silent)
+    assert HPolytope.box([1.0, 1.0], [2.0, 2.0]).emptiness().status == "nonempty"  # settled in rationals
+    large = HPolytope.box(np.ones(50), np.full(50, 2.0))
+    answer = large.emptiness()
+    assert answer.status == "undecided"
+    assert "rational arithmetic" in answer.reason
+    with pytest.raises(UndecidedError):
+        large.support(np.ones(50))
+
+
+def test_farkas_over_a_box_of_variables() -> None:
+    A, b = np.array([[1.0, 1.0]]), np.array([-3.0])
+    empty = np.empty((0, 2)), np.empty(0)
+    one = {0: fmpq(1)}
+    assert refutes(A, b, *empty, one, {}, box=(np.array([-1.0, -1.0]), np.array([np.inf, np.inf])))
+    assert not refutes(A, b, *empty, one, {}, box=(np.array([-1.5, -1.5]), np.array([1.0, 1.0])))
+    assert not refutes(A, b, *empty, one, {}, box=(np.array([-np.inf, -1.0]), np.array([1.0, 1.0])))
+    assert not refutes(A, b, *empty, one, {})
