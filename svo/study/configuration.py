@@ -1,0 +1,157 @@
+"""What a study runs: its configuration, the list of its runs, and the seed of each."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from svo.plant import HEALTHY, Plant
+
+_PACKAGES = ("svo-fdi", "numpy", "scipy", "numba", "highspy", "python-flint", "pyarrow")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of a study.
+
+    Attributes
+    ----------
+    run : int
+        Number of the run, from 0, in the order of the study.
+    fault, profile, noise : str
+        ``fault`` and ``profile`` are both "none" in a fault-free run.
+    seed : int
+        Seed of this run alone: ``svo simulate`` with it makes the same log.
+    exemplary : bool
+        Whether the run is the one of its kind whose samples are kept for the pictures.
+    """
+
+    run: int
+    fault: str
+    profile: str
+    noise: str
+    seed: int
+    exemplary: bool
+
+
+@dataclass(frozen=True)
+class StudyConfiguration:
+    """Everything that the results of a study depend on, besides the versions of the software.
+
+    Attributes
+    ----------
+    plant : str
+        Name in the registry of plants.
+    noise : tuple of str
+        Noise sets.
+    faults : tuple of str
+        Names of faults; "none" stands for the fault-free runs.
+    runs : int
+        Runs of each noise set, fault and profile.
+    seed : int
+        The seed that all others are spawned from.
+    """
+
+    plant: str
+    noise: tuple[str, ...]
+    faults: tuple[str, ...]
+    runs: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        if self.runs < 1:
+            raise ValueError(f"runs is {self.runs}; expected at least 1 run of each fault and profile")
+        if self.seed < 0:
+            raise ValueError(f"seed is {self.seed}; expected an integer >= 0")
+        for name in ("noise", "faults"):
+            values = getattr(self, name)
+            if not values or len(set(values)) != len(values):
+                raise ValueError(f"{name} is {values}; expected one or more different names")
+
+    @classmethod
+    def for_plant(
+        cls, plant: Plant, *, runs: int, seed: int, noise: Sequence[str] = (), faults: Sequence[str] = ()
+    ) -> StudyConfiguration:
+        """A configuration checked against a plant.
+
+        Without ``noise`` it has the plant's default noise set, without ``faults`` all faults and the fault-free runs.
+
+        Raises
+        ------
+        ValueError
+            If the plant has no noise set or fault of a name; the message lists those that it has.
+        """
+        noise = tuple(noise) or plant.noise_sets[:1]
+        faults = tuple(faults) or (HEALTHY, *plant.faults)
+        for name in noise:
+            check_noise(plant, name)
+        for name in faults:
+            if name != HEALTHY:
+                check_fault(plant, name)
+        return cls(plant=plant.name, noise=noise, faults=faults, runs=runs, seed=seed)
+
+    def jobs(self, plant: Plant) -> list[Job]:
+        """The runs in their order.
+
+        The seed of a run depends on the study's seed, on the run's place among those of its kind, and on nothing
+        else: neither on the number of runs nor on which faults and noise sets were chosen.
+        """
+        every = [(n, f, p) for n in plant.noise_sets for f, p in conditions(plant)]
+        jobs: list[Job] = []
+        for (noise, fault, profile), parent in zip(
+            every, np.random.SeedSequence(self.seed).spawn(len(every)), strict=True
+        ):
+            if noise not in self.noise or fault not in self.faults:
+                continue
+            for i, child in enumerate(parent.spawn(self.runs)):
+                # 53 bits: an integer that JSON readers keep exactly.
+                seed = int(child.generate_state(1, np.uint64)[0] >> np.uint64(11))
+                jobs.append(Job(len(jobs), fault, profile, noise, seed, exemplary=i == 0))
+        return jobs
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form for JSON; lists instead of tuples."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+
+def conditions(plant: Plant) -> list[tuple[str, str]]:
+    """(fault, profile) of a plant, ("none", "none") first."""
+    return [(HEALTHY, HEALTHY), *((fault, profile) for fault, profiles in plant.faults.items() for profile in profiles)]
+
+
+def check_noise(plant: Plant, noise: str) -> None:
+    """Raise a ValueError if the plant has no noise set of that name."""
+    if noise not in plant.noise_sets:
+        raise ValueError(f"plant {plant.name!r} has no noise set {noise!r}; it has {', '.join(plant.noise_sets)}")
+
+
+def check_fault(plant: Plant, fault: str, profile: str | None = None) -> None:
+    """Raise a ValueError if the plant has no fault, or that fault no profile, of that name."""
+    if fault not in plant.faults:
+        raise ValueError(
+            f"plant {plant.name!r} has no fault {fault!r}; it has {', '.join(plant.faults)} (and {HEALTHY!r})"
+        )
+    if profile is not None and profile not in plant.faults[fault]:
+        raise ValueError(f"fault {fault!r} has no profile {profile!r}; it has {', '.join(plant.faults[fault])}")
+
+
+def versions() -> dict[str, str]:
+    """Versions of the software and the kind of machine, for the record."""
+    return {
+        **{name: _version(name) for name in _PACKAGES},
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+    }
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"

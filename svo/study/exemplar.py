@@ -1,0 +1,127 @@
+"""The samples of one exemplary run that the pictures need: models alive, boxes, some sets, true states."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo.detect import verdicts
+from svo.log import Log
+from svo.plant import Plant
+from svo.study.configuration import Job
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The sets of the models alive at one sample; ``event`` says what happens at the next one."""
+
+    sample: int
+    event: str
+    sets: Mapping[str, HPolytope]
+
+
+@dataclass(frozen=True)
+class Exemplar:
+    """What one run looked like from inside.
+
+    Attributes
+    ----------
+    fault, profile, noise : str
+    names : tuple of str
+        The observers, "nominal" first.
+    time : (K,) array
+        Seconds.
+    alive : (K, n_observers) array of bool
+    lower, upper : (K, n_observers, n) arrays
+        Boxes of the state; NaN once a model is falsified.
+    x : (K, n) array
+        True states.
+    snapshots : tuple of Snapshot
+        Before each falsification, and at the end.
+    """
+
+    fault: str
+    profile: str
+    noise: str
+    names: tuple[str, ...]
+    time: Array
+    alive: NDArray[np.bool_]
+    lower: Array
+    upper: Array
+    x: Array
+    snapshots: tuple[Snapshot, ...]
+
+    @property
+    def last_falsification(self) -> int:
+        """Sample at which the last of the falsified models fell; 0 if none did."""
+        return max((self.died_at(i) or 0 for i in range(len(self.names))), default=0)
+
+    def died_at(self, observer: int) -> int | None:
+        """Sample from which an observer, by its number, is falsified to the end; None if it is alive there."""
+        alive = self.alive[:, observer]
+        return None if alive[-1] else int(np.flatnonzero(np.append(True, alive))[-1])
+
+    def save(self, path: Path) -> None:
+        """Write all of it as a compressed .npz without pickled objects."""
+        header: dict[str, Any] = {"fault": self.fault, "profile": self.profile, "noise": self.noise}
+        header["names"] = list(self.names)
+        header["snapshots"] = [{"sample": s.sample, "event": s.event, "sets": list(s.sets)} for s in self.snapshots]
+        arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
+        arrays |= {name: getattr(self, name) for name in ("time", "alive", "lower", "upper", "x")}
+        for i, snapshot in enumerate(self.snapshots):
+            for j, polytope in enumerate(snapshot.sets.values()):
+                arrays[f"A_{i}_{j}"], arrays[f"b_{i}_{j}"] = polytope.A, polytope.b
+        with path.open("wb") as file:
+            np.savez_compressed(file, **arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> Exemplar:
+        """Read what `save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            header = json.loads(str(data["header"]))
+            snapshots = tuple(
+                Snapshot(
+                    s["sample"],
+                    s["event"],
+                    {name: HPolytope(data[f"A_{i}_{j}"], data[f"b_{i}_{j}"]) for j, name in enumerate(s["sets"])},
+                )
+                for i, s in enumerate(header["snapshots"])
+            )
+            arrays = {name: data[name] for name in ("time", "alive", "lower", "upper", "x")}
+        names = tuple(header["names"])
+        return cls(header["fault"], header["profile"], header["noise"], names, snapshots=snapshots, **arrays)
+
+
+def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
+    """Drive a fresh bank over a log and keep what it knew at each sample."""
+    if log.x is None:
+        raise ValueError(f"plant {plant.name!r} simulates without true states; expected Log.x for the pictures")
+    bank = plant.bank(job.noise)
+    n, names = log.x.shape[1], tuple(bank.names)
+    alive = np.zeros((len(log), len(names)), dtype=bool)
+    lower = np.full((len(log), len(names), n), np.nan)
+    upper = lower.copy()
+    snapshots: list[Snapshot] = []
+    sets: dict[str, HPolytope] = {}
+    living: tuple[str, ...] = names
+    for k, verdict in enumerate(verdicts(bank, log)):
+        fallen = [name for name in living if name not in verdict.alive]
+        if fallen and sets:
+            snapshots.append(Snapshot(k - 1, f"{', '.join(fallen)} falsified next", sets))
+        living = verdict.alive
+        sets = {name: verdict.steps[name].set for name in living}
+        for name in living:
+            i = names.index(name)
+            alive[k, i] = True
+            lower[k, i], upper[k, i] = verdict.steps[name].box
+    snapshots.append(Snapshot(len(log) - 1, "end of the run", sets))
+    return Exemplar(job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots))

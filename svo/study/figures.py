@@ -1,0 +1,176 @@
+"""The pictures of a study as files, each composed of the panels of `svo.study.plots`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from svo.plant import HEALTHY, Plant
+from svo.study import plots
+from svo.study.exemplar import Exemplar
+from svo.study.summary import ConditionSummary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STYLE: Any = {
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#8A929B",
+    "xtick.color": "#3B434B",
+    "ytick.color": "#3B434B",
+    "legend.frameon": False,
+    "savefig.facecolor": "white",
+}
+DPI = 150
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture that has been written, and what it shows."""
+
+    path: Path
+    title: str
+    caption: str
+
+
+def write_pictures(
+    folder: Path, plant: Plant, summaries: Sequence[ConditionSummary], exemplars: Sequence[Exemplar]
+) -> list[Picture]:
+    """Write the pictures of a study as PNG files into a folder."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        return list(_pictures(folder, plant, summaries, exemplars))
+
+
+def _pictures(
+    folder: Path, plant: Plant, summaries: Sequence[ConditionSummary], exemplars: Sequence[Exemplar]
+) -> Iterator[Picture]:
+    for noise in dict.fromkeys(s.noise for s in summaries):
+        chosen = [s for s in summaries if s.noise == noise and s.fault != HEALTHY]
+        shown = [e for e in exemplars if e.noise == noise and e.fault != HEALTHY]
+        if not chosen:
+            continue
+        text = "Bars: mean; lines: 5–95 % of the runs; a count where not every run got there."
+        if plant.reference:
+            text += f" Diamonds: {plant.reference_title}; a triangle points down from an upper bound."
+        title = f"Times to detect and to isolate, {noise} noise"
+        yield _save(folder / f"delays_{noise}.png", _delays(plant, chosen), title, text)
+        title = f"Models alive over time, {noise} noise"
+        text = "One run of each fault and profile. A bar ends where the model is falsified, with the delay beside it."
+        yield _save(folder / f"alive_{noise}.png", _alive(plant, shown), title, text)
+        slow = _slowest(shown)
+        if slow[0].x.shape[1] > 1:
+            title = f"Sets of the models and the true state, {noise} noise"
+            text = (
+                "Projections on the two states in which the models drift furthest apart, in the slowest exemplary run "
+                "of each fault: at the last samples before models are falsified, and at the end. "
+                "The cross is the true state."
+            )
+            yield _save(folder / f"sets_{noise}.png", _sets(plant, slow), title, text)
+        title = f"Bounds and true state, {noise} noise"
+        text = "The same runs: what the nominal model (until it is falsified) and the true fault's model allow."
+        yield _save(folder / f"bounds_{noise}.png", _bounds(plant, slow), title, text)
+
+
+def _delays(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
+    from matplotlib.lines import Line2D
+
+    figure = _figure(max(5.5, 1.0 * len(summaries)), 3.9)
+    ax = figure.subplots()
+    plots.plot_delays(summaries, plant.Ts, plant.reference, ax)
+    handles = ax.get_legend_handles_labels()[0]
+    if any(key in plant.reference for key in ((s.fault, s.profile) for s in summaries)):
+        handles.append(
+            Line2D([], [], marker="D", color=plots.PAPER, linestyle="", markeredgecolor="white", label="paper")
+        )
+        handles.append(
+            Line2D(
+                [], [], marker="v", color=plots.PAPER, linestyle="", markeredgecolor="white", label="paper: below this"
+            )
+        )
+    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    return figure
+
+
+def _alive(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
+    faults = list(dict.fromkeys(e.fault for e in exemplars))
+    columns = max(sum(e.fault == fault for e in exemplars) for fault in faults)
+    figure = _figure(3.3 * columns + 0.6, 1.75 * len(faults) + 0.3)
+    axes = figure.subplots(len(faults), columns, squeeze=False)
+    for row, fault in zip(axes, faults, strict=True):
+        chosen = [e for e in exemplars if e.fault == fault]
+        for ax, exemplar in zip(row, chosen, strict=False):
+            plots.plot_alive(exemplar, plant.fault_time, plant.Ts, ax)
+            ax.set_title(f"{exemplar.fault}, {exemplar.profile}")
+            if ax is not row[0]:
+                ax.set_yticklabels([])
+        for ax in row[len(chosen) :]:
+            ax.set_axis_off()
+    return figure
+
+
+def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    columns = max(len(e.snapshots) for e in exemplars)
+    figure = _figure(3.0 * columns + 0.4, 2.6 * len(exemplars) + 0.4)
+    axes = figure.subplots(len(exemplars), columns, squeeze=False)
+    for row, exemplar in zip(axes, exemplars, strict=True):
+        dims = plots.separating_states(exemplar)
+        for ax, snapshot in zip(row, exemplar.snapshots, strict=False):
+            plots.plot_sets(exemplar, snapshot, dims, plant.columns.states, ax)
+            delay = exemplar.time[snapshot.sample] - plant.fault_time + plant.Ts
+            ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {delay:+.2f} s", fontsize=9.5)
+            ax.text(0, 1.0, snapshot.event, transform=ax.transAxes, fontsize=8, color="#3B434B", va="bottom")
+        for ax in row[len(exemplar.snapshots) :]:
+            ax.set_axis_off()
+    names = exemplars[0].names
+    handles: list[Patch | Line2D] = [
+        Patch(label=name, **plots.face(colour)) for name, colour in plots.colours(names).items()
+    ]
+    handles.append(Line2D([], [], marker="x", linestyle="", color="#111111", markeredgewidth=1.8, label="true state"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    return figure
+
+
+def _bounds(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
+    columns = min(2, len(plant.columns.states))
+    figure = _figure(4.1 * columns, 2.3 * len(exemplars) + 0.3)
+    axes = figure.subplots(len(exemplars), columns, squeeze=False)
+    for row, exemplar in zip(axes, exemplars, strict=True):
+        for ax, state in zip(row, plots.separating_states(exemplar), strict=True):
+            plots.plot_bounds(exemplar, state, plant.columns.states, plant.fault_time, ax)
+            plots.zoom(ax, exemplar, state, plant.fault_time, plots.time_window(exemplar, plant.fault_time, plant.Ts))
+        row[0].set_title(f"{exemplar.fault}, {exemplar.profile}")
+        row[0].legend(loc="best", fontsize=8)
+    return figure
+
+
+def _slowest(exemplars: Sequence[Exemplar]) -> list[Exemplar]:
+    """Of each fault, the exemplary run in which most samples pass before the last falsification."""
+    slowest: dict[str, Exemplar] = {}
+    for exemplar in exemplars:
+        best = slowest.get(exemplar.fault)
+        if best is None or exemplar.last_falsification > best.last_falsification:
+            slowest[exemplar.fault] = exemplar
+    return list(slowest.values())
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _save(path: Path, figure: Figure, title: str, caption: str) -> Picture:
+    figure.savefig(path, dpi=DPI)
+    return Picture(path, title, caption)

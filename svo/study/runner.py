@@ -1,0 +1,139 @@
+"""Run a study in processes: the same rows for any number of workers, and a kill loses only the runs in flight."""
+
+from __future__ import annotations
+
+import functools
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+from svo.plant import HEALTHY, Plant, load_plant
+from svo.study.configuration import Job, StudyConfiguration
+from svo.study.run import execute
+from svo.study.store import StudyFolder
+
+Progress = Callable[[int, int], None]
+
+
+def run_study(
+    configuration: StudyConfiguration,
+    out: str | Path,
+    *,
+    workers: int = 1,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> StudyFolder:
+    """Run what is still to be run of a study and store it, run by run.
+
+    The plant is found by its name in the registry, in every process. Call `warm_up` first where numba may still
+    have to compile, or each worker compiles the same code.
+
+    Parameters
+    ----------
+    configuration : StudyConfiguration
+    out : path
+        A folder that is new or empty, or holds this very study if ``resume``.
+    workers : int
+        Number of processes; 1 runs in this one.
+    resume : bool
+        Go on with the study in ``out``.
+    progress : callable, optional
+        Called with (runs done, runs in all), at the start and after every run.
+
+    Returns
+    -------
+    StudyFolder
+        With the rows, alarms and exemplary runs.
+
+    Raises
+    ------
+    ValueError
+        If the folder cannot be used (see `StudyFolder.open`) or ``workers`` is below 1.
+    RuntimeError
+        If a run fails or a worker dies; the runs that are done are kept.
+    """
+    if workers < 1:
+        raise ValueError(f"workers is {workers}; expected at least 1 process")
+    folder = StudyFolder(Path(out))
+    jobs = configuration.jobs(_plant(configuration.plant))
+    done = folder.open(configuration, resume)
+    to_do = [job for job in jobs if job.run not in done]
+    if progress is not None:
+        progress(len(jobs) - len(to_do), len(jobs))
+    finished = _in_processes if workers > 1 and len(to_do) > 1 else _here
+    for count, _ in enumerate(finished(configuration, folder, to_do, workers), start=len(jobs) - len(to_do) + 1):
+        if progress is not None:
+            progress(count, len(jobs))
+    folder.join_alarms()
+    return folder
+
+
+def warm_up(plant: Plant, noise: str) -> float:
+    """Compile what a run needs, simulator and observers; returns the seconds of the observers' part."""
+    plant.simulate(HEALTHY, HEALTHY, noise, 0)
+    return plant.bank(noise).warm_up()
+
+
+def _here(configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job], workers: int) -> Iterator[int]:
+    for job in jobs:
+        yield _run(configuration, folder, job)
+
+
+def _in_processes(
+    configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job], workers: int
+) -> Iterator[int]:
+    # Spawned, not forked: a fork would copy the locks of threads that run in this process.
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_watch_parent)
+    waiting = iter(jobs)
+    running: set[Future[int]] = set()
+    try:
+        with pool:
+            while True:
+                # Few runs are handed out ahead, so that an interruption does not leave a long queue.
+                for job in waiting:
+                    running.add(pool.submit(_run, configuration, folder, job))
+                    if len(running) >= 2 * workers:
+                        break
+                if not running:
+                    return
+                done, running = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+    except BrokenProcessPool as error:
+        raise RuntimeError(
+            "a worker process died (killed, or out of memory); the runs that are done are kept, resume to go on"
+        ) from error
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _watch_parent() -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Workers of a killed parent would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+@functools.cache
+def _plant(name: str) -> Plant:
+    """A plant is loaded once a process: its tables may take a while."""
+    return load_plant(name)
+
+
+def _run(configuration: StudyConfiguration, folder: StudyFolder, job: Job) -> int:
+    try:
+        folder.write(execute(_plant(configuration.plant), job), configuration)
+    except Exception as error:
+        where = f"fault {job.fault}, profile {job.profile}, noise {job.noise}, seed {job.seed}"
+        raise RuntimeError(f"run {job.run} ({where}) failed: {type(error).__name__}: {error}") from error
+    return job.run

@@ -1,0 +1,15 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+REGISTERED = Path(__file__).parent / "study" / "registered"
+
+
+@pytest.fixture
+def registered_tank(monkeypatch: pytest.MonkeyPatch) -> str:
+    """Make the test plant an installed distribution, here and in processes that are started from here."""
+    monkeypatch.syspath_prepend(str(REGISTERED))
+    monkeypatch.setenv("PYTHONPATH", str(REGISTERED))
+    return "tank"
