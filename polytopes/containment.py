@@ -24,8 +24,6 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> bool:
     """
     if not known_nonempty(Q):
         return True
-    if not known_nonempty(P):
-        return False
     normals, rhs = np.vstack([P.A, P.C, -P.C]), np.concatenate([P.b, P.d, -P.d])
     result = maxima(Q, normals)
     assert result is not None  # Q has a point

@@ -222,10 +222,10 @@ class HPolytope(Rows):
     def outer_template(self, directions: ArrayLike) -> Self:
         """Smallest set ``{x : T x <= h}`` with the given normals (k, n) that contains this one.
 
-        Normals along which this set is unbounded are left out.
+        Normals along which this set is unbounded are left out; offsets are rounded outward (128 units of last place).
         """
         normals = as_matrix("directions", directions, self.dim)
-        if not self.program.consistent or self.decided.status == "empty":
+        if not support_functions.known_nonempty(self):
             return type(self).empty(self.dim)
         return type(self)(*support_functions.outer_template(self, normals))
 

@@ -27,7 +27,10 @@ _KERNEL_ENTRIES = 200_000
 _CLEAN = 1e-9  # relative violation of the optimality conditions that is still accepted from HiGHS
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
 
+_ANNOUNCE_AFTER = 1.5  # seconds; loading the kernels from the cache takes less
+
 OPTIMAL, UNBOUNDED, UNDECIDED = "optimal", "unbounded", "undecided"
+_NAMES = {kernel.OPTIMAL: OPTIMAL, kernel.UNBOUNDED: UNBOUNDED}
 
 
 @cache
@@ -37,9 +40,8 @@ def warm_up() -> None:
     The first time on a machine takes some ten seconds, and one line on the logger ``polytopes`` says so; afterwards it
     takes a fraction of a second.  Called on first use; call it yourself before a loop that must not be delayed.
     """
-    announce = threading.Timer(
-        1.5, logging.getLogger("polytopes").warning, ["compiling the LP kernels: once on this machine, about 15 s"]
-    )
+    line = "compiling the LP kernels: once on this machine, about 20 s"
+    announce = threading.Timer(_ANNOUNCE_AFTER, logging.getLogger("polytopes").warning, [line])
     announce.daemon = True
     announce.start()
     try:
@@ -109,7 +111,7 @@ class Program:
         """Whether neither the equalities nor a constant row are contradictory by themselves."""
         return self.flat.contradiction is None and self.violated is None
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The size that tolerances refer to: the largest scaled |b|, or 1."""
         return float(np.abs(self.rhs).max(initial=0.0)) or 1.0
@@ -148,7 +150,7 @@ class Program:
         unscaled = self._unscaled(np.maximum(weights, 0.0))
         return Interior(self.flat.lift(point[:-1]), _uncapped(point[-1], cap), unscaled, answer.status == "optimal")
 
-    @property
+    @cached_property
     def thin(self) -> bool:
         """Whether the set is so thin (or so nearly empty) that only exact arithmetic can say that it has a point."""
         interior = self.interior
@@ -167,24 +169,22 @@ class Program:
         status = [OPTIMAL] * k if free == 0 else [UNDECIDED] * k
         if free and self._small:
             status = self._maximise_by_kernel(reduced, points, weights)
-        values = np.full(k, np.inf)
-        solved = [q for q in range(k) if status[q] == OPTIMAL]
         lifted, multipliers = self.flat.lift(points), np.zeros((k, self.b.size))
         multipliers[:, self.kept] = weights * self.scale
-        values[solved] = np.einsum("ij,ij->i", directions[solved], lifted[solved])
-        for q in range(k):
+        solved = np.array([name == OPTIMAL for name in status], dtype=bool)
+        values = np.where(solved, (directions * lifted).sum(axis=1), np.inf)
+        for q in np.flatnonzero(~solved).tolist():
             if status[q] == UNDECIDED:
                 status[q], values[q], lifted[q], multipliers[q] = self._maximise_carefully(directions[q], reduced[q])
         return Maxima(values, lifted, multipliers, status)
 
     def _maximise_by_kernel(self, reduced: Floats, points: Floats, weights: Floats) -> list[str]:
         warm_up()
-        start = np.ascontiguousarray(self.interior.point[self.flat.free])
-        _, points[:], active, y, status = kernel.supports(self.AT, self.rhs, start, np.ascontiguousarray(reduced))
+        start = self.interior.point[self.flat.free]
+        points[:], active, y, status = kernel.supports(self.AT, self.rhs, start, reduced)
         row, slot = np.nonzero(active >= 0)
         weights[row, active[row, slot]] = y[row, slot]
-        names = {kernel.OPTIMAL: OPTIMAL, kernel.UNBOUNDED: UNBOUNDED}
-        return [names.get(int(code), UNDECIDED) for code in status]
+        return [_NAMES.get(code, UNDECIDED) for code in status.tolist()]
 
     def _maximise_carefully(self, direction: Floats, reduced: Floats) -> tuple[str, float, Floats, Floats]:
         """HiGHS, accepted if the optimality conditions hold; else the rational simplex."""

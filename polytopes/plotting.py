@@ -68,7 +68,8 @@ def plot(P: Rows, ax: Any, dims: tuple[int, int], style: dict[str, Any]) -> list
     if len(outline) == 1:
         style = {key: value for key, value in style.items() if key != "facecolor"}
         return list(ax.plot(*outline.T, marker="o", **style))
-    patch = Polygon(outline, closed=True, **{"alpha": 0.4, "edgecolor": "black", **style})
+    edge = {} if "color" in style else {"edgecolor": "black"}
+    patch = Polygon(outline, closed=True, **{"alpha": 0.4, **edge, **style})
     ax.add_patch(patch)
     ax.autoscale_view()
     return [patch]

@@ -385,8 +385,8 @@ def _nearest_order(directions: Matrix) -> Index:
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
 def supports(
     AT: Matrix, b: Vector, x0: Vector, directions: Matrix
-) -> tuple[Vector, Matrix, Index, Matrix, Index]:
-    """Support function in k directions, each program started from the vertex of its neighbour.
+) -> tuple[Matrix, Index, Matrix, Index]:
+    """Support points in k directions, each program started from the vertex of its neighbour.
 
     Parameters
     ----------
@@ -398,13 +398,12 @@ def supports(
 
     Returns
     -------
-    values, points, active, multipliers, status
-        Arrays (k,), (k, d), (k, d), (k, d), (k,).  Values, points and multipliers mean something only where the status
-        is `OPTIMAL`; the value is inf where it is `UNBOUNDED`.
+    points, active, multipliers, status
+        Arrays (k, d), (k, d), (k, d), (k,).  Points and multipliers mean something only where the status is `OPTIMAL`.
     """
     d, m = AT.shape
     k = directions.shape[0]
-    values, points = np.empty(k), np.empty((k, d))
+    points = np.empty((k, d))
     active, multipliers, status = np.empty((k, d), np.int64), np.zeros((k, d)), np.empty(k, np.int64)
     x, s, W, Q = np.empty(d), np.empty(m), np.empty(d, np.int64), np.empty((d, d))
     scale = _scale_of(b)
@@ -412,16 +411,11 @@ def supports(
     for q in _nearest_order(directions):
         c, y = directions[q], multipliers[q]
         status[q] = _optimise(AT, b, c, x, s, W, Q, y, scale)
-        values[q] = np.inf if status[q] == UNBOUNDED else 0.0
-        if status[q] == OPTIMAL:
-            values[q] = 0.0
-            for j in range(d):
-                values[q] += c[j] * x[j]
         points[q] = x
         active[q] = W
         if status[q] in (LIMIT, AMBIGUOUS):
             _start(AT, b, x0, x, s, W, Q)
-    return values, points, active, multipliers, status
+    return points, active, multipliers, status
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)

@@ -13,6 +13,7 @@ from polytopes.linear_program import UNDECIDED, Maxima
 from polytopes.rows import Rows
 
 Floats = NDArray[np.float64]
+_OUTWARD = 128.0 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,10 +153,14 @@ def chebyshev(P: Rows) -> Ball:
 
 
 def outer_template(P: Rows, directions: Floats) -> tuple[Floats, Floats]:
-    """Rows ``T x <= h_P(T)`` of the smallest polytope with the given normals that contains P.
+    """Rows ``T x <= h_P(T)`` of the smallest polytope with the given normals that contains the nonempty P.
 
-    Directions in which P is unbounded give no row.
+    Directions in which P is unbounded give no row.  The values are rounded outward by 128 units of the last place of
+    the terms of ``c'x``, so that the template of a flat set keeps its points.
     """
-    values = np.atleast_1d(support(P, directions))
-    finite = np.isfinite(values)
-    return directions[finite], values[finite]
+    result = maxima(P, directions)
+    assert result is not None
+    finite = np.isfinite(result.values)
+    normals, points = directions[finite], result.points[finite]
+    reach = np.abs(points).max(axis=1, initial=0.0)
+    return normals, result.values[finite] + _OUTWARD * reach * np.abs(normals).sum(axis=1)

@@ -1,0 +1,43 @@
+"""Pictures: each kind of set gives artists that show it."""
+
+import matplotlib
+import numpy as np
+import pytest
+from sets import CATALOGUE, EMPTY
+
+from polytopes import HPolytope
+from polytopes.plotting import shadow
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+
+@pytest.mark.parametrize("name", [name for name, P in CATALOGUE.items() if P.dim >= 2])
+def test_every_kind_of_set_can_be_drawn(name: str) -> None:
+    figure, ax = plt.subplots()
+    artists = CATALOGUE[name].plot(ax=ax, color="tab:blue")
+    assert len(artists) == (0 if name in EMPTY else 1)
+    figure.canvas.draw()
+    plt.close(figure)
+
+
+def test_shadow_of_a_turned_cube_has_the_support_of_the_cube() -> None:
+    rng = np.random.default_rng(0)
+    turn = np.linalg.qr(rng.standard_normal((4, 4)))[0]
+    P = HPolytope.box(-np.ones(4), np.ones(4)).preimage(turn)
+    outline = shadow(P, (1, 3))
+    assert len(outline) == 8  # a projected 4-cube is a zonotope of four generators
+    c = rng.standard_normal((50, 2))
+    lifted = np.zeros((50, 4))
+    lifted[:, [1, 3]] = c
+    np.testing.assert_allclose((outline @ c.T).max(axis=0), P.support(lifted), atol=1e-12)
+    edges = np.roll(outline, -1, axis=0) - outline
+    turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
+    assert (turns > 0.0).all()
+
+
+def test_dims_are_checked() -> None:
+    with pytest.raises(ValueError, match="dims is"):
+        CATALOGUE["cube"].plot(dims=(0, 3))
+    with pytest.raises(ValueError, match="dims is"):
+        CATALOGUE["cube"].plot(dims=(1, 1))

@@ -1,0 +1,115 @@
+"""Every operation on every kind of set: empty, whole, unbounded, flat, 1-D, point, duplicate, scaled and zero rows."""
+
+import numpy as np
+import pytest
+from sets import CATALOGUE, DIMENSION, EMPTY, FACETS, UNBOUNDED, VERTICES
+
+from polytopes import EmptySetError, HPolytope, UnboundedError
+
+EVERY = pytest.mark.parametrize("name", CATALOGUE)
+
+
+def directions(P: HPolytope) -> np.ndarray:
+    return np.random.default_rng(1).standard_normal((40, P.dim))
+
+
+@EVERY
+def test_emptiness(name: str) -> None:
+    P, answer = CATALOGUE[name], CATALOGUE[name].emptiness()
+    if name in EMPTY:
+        assert answer.status == "empty"
+        assert answer.certificate is not None
+        assert answer.certificate.verify(P)
+    else:
+        assert answer.status == "nonempty"
+        assert answer.witness is not None
+        assert P.contains(answer.witness)
+
+
+@EVERY
+def test_support_and_bounds(name: str) -> None:
+    P = CATALOGUE[name]
+    values = P.support(directions(P))
+    assert P.is_bounded() == (name not in UNBOUNDED)
+    if name in EMPTY:
+        assert (values == -np.inf).all()
+        with pytest.raises(EmptySetError):
+            P.bounding_box()
+        with pytest.raises(EmptySetError):
+            P.chebyshev()
+        return
+    result, (lower, upper) = P.support_points(directions(P)), P.bounding_box()
+    np.testing.assert_array_equal(result.values, values)
+    finite = np.isfinite(values)
+    assert finite.all() == (name not in UNBOUNDED)
+    assert P.contains(result.points[finite]).all()
+    assert np.isnan(result.points[~finite]).all()
+    np.testing.assert_allclose(np.sum(result.points * directions(P), axis=1)[finite], values[finite], rtol=1e-12)
+    for j, axis in enumerate(np.eye(P.dim)):
+        assert (lower[j], upper[j]) == pytest.approx((-P.support(-axis), P.support(axis)), abs=1e-15)
+    ball = P.chebyshev()
+    assert P.contains(ball.centre)
+    assert ball.radius >= 0.0
+
+
+@EVERY
+def test_dimension_and_minimal_description(name: str) -> None:
+    P = CATALOGUE[name]
+    assert P.affine_dim() == DIMENSION.get(name, 2)
+    Q = P.remove_redundancy()
+    assert (Q.b.size, Q.d.size) == FACETS[name]
+    assert Q.equals(P)
+    np.testing.assert_allclose(Q.support(directions(P)), P.support(directions(P)), atol=1e-12)
+
+
+@EVERY
+def test_vertices(name: str) -> None:
+    P = CATALOGUE[name]
+    if name in UNBOUNDED:
+        with pytest.raises(UnboundedError, match="intersect it with a box"):
+            P.vertices()
+        return
+    V = P.vertices()
+    assert V.shape == (VERTICES[name], P.dim)
+    if len(V):
+        assert P.contains(V).all()
+        np.testing.assert_allclose((V @ directions(P).T).max(axis=0), P.support(directions(P)), atol=1e-12)
+        again = HPolytope.from_vertices(V)
+        assert again.equals(P, tol=1e-9)
+        assert again.affine_dim() == P.affine_dim()
+
+
+@EVERY
+def test_containment_and_equality(name: str) -> None:
+    P = CATALOGUE[name]
+    assert P.contains(P)
+    assert P.equals(P)
+    assert P.contains(HPolytope.empty(P.dim))
+    assert HPolytope.whole_space(P.dim).contains(P)
+    assert HPolytope.empty(P.dim).contains(P) == (name in EMPTY)
+    assert P.contains(HPolytope.whole_space(P.dim)) == (name == "whole space")
+
+
+@EVERY
+def test_intersection_product_preimage(name: str) -> None:
+    P = CATALOGUE[name]
+    assert P.intersection(P).equals(P)
+    assert P.intersection(HPolytope.whole_space(P.dim)).equals(P)
+    assert P.intersection(HPolytope.empty(P.dim)).emptiness().status == "empty"
+    prism = P.product(HPolytope.box([0.0], [1.0]))
+    assert prism.affine_dim() == (-1 if name in EMPTY else P.affine_dim() + 1)
+    shift = np.full(P.dim, 0.5)
+    moved = P.preimage(2.0 * np.eye(P.dim), shift)
+    c = directions(P)
+    np.testing.assert_allclose(2.0 * moved.support(c) + c @ shift, P.support(c), atol=1e-12)
+    collapsed = P.preimage(np.zeros((P.dim, 2)))
+    assert (collapsed.emptiness().status == "nonempty") == bool(P.contains(np.zeros(P.dim), tol=0.0))
+
+
+@EVERY
+def test_outer_template(name: str) -> None:
+    P = CATALOGUE[name]
+    normals = np.vstack([np.eye(P.dim), -np.eye(P.dim), directions(P)[:5]])
+    T = P.outer_template(normals)
+    assert T.contains(P, tol=1e-13)
+    np.testing.assert_allclose(T.support(normals), P.support(normals), atol=1e-12)
