@@ -1,0 +1,127 @@
+"""What a bank says at a sample, and over a whole log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.isolation.logic import BankState
+from svo.observers.step import Step
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The bank's conclusion at one sample.
+
+    Attributes
+    ----------
+    sample : int
+        Counted from the first measurement, which is sample 0.
+    state : {"nominal", "detected", "isolated", "unexplained"}
+    fault : str or None
+        The fault that is isolated, None otherwise.
+    alive : tuple of str
+        Models that are not declared falsified.
+    detected_at, isolated_at : int or None
+        Sample at which the present fault was detected, and isolated.
+    steps : mapping of str to Step
+        Answers of the observers that were stepped. Boxes and sets must be read before the next sample.
+    """
+
+    sample: int
+    state: BankState
+    fault: str | None
+    alive: tuple[str, ...]
+    detected_at: int | None
+    isolated_at: int | None
+    steps: Mapping[str, Step]
+
+
+@dataclass(frozen=True)
+class BankRecord:
+    """A run of a bank over a log of K samples; columns in the order of ``names``.
+
+    Attributes
+    ----------
+    names : tuple of str
+        "nominal", then the faults.
+    states : tuple of str
+        State of the bank at each sample.
+    alive : (K, n_observers) array of bool
+        Models not declared falsified, after each sample.
+    seconds : (K, n_observers) array
+        Wall time of each observer's step; NaN where it was not stepped.
+    undecided : (K, n_observers) array of bool
+        Answers that were neither a proof nor a point.
+    died_at : mapping of str to int or None
+        First sample at which a model was declared falsified.
+    certificates : mapping of str to certificate or None
+        Proof of that falsification.
+    detected_at, isolated_at : int or None
+        FIRST sample of the run at which a fault was detected, and at which one was isolated.
+    fault : str or None
+        The fault that was isolated then.
+    """
+
+    names: tuple[str, ...]
+    states: tuple[BankState, ...]
+    alive: NDArray[np.bool_]
+    seconds: NDArray[np.float64]
+    undecided: NDArray[np.bool_]
+    died_at: Mapping[str, int | None]
+    certificates: Mapping[str, Any]
+    detected_at: int | None
+    isolated_at: int | None
+    fault: str | None
+
+
+class Recorder:
+    """Collects the verdicts of a run without keeping their steps."""
+
+    def __init__(self, names: tuple[str, ...], samples: int) -> None:
+        self._names = names
+        self._states: list[BankState] = []
+        self._alive = np.zeros((samples, len(names)), dtype=bool)
+        self._seconds = np.full((samples, len(names)), np.nan)
+        self._undecided = np.zeros((samples, len(names)), dtype=bool)
+        self._died_at: dict[str, int | None] = dict.fromkeys(names)
+        self._certificates: dict[str, Any] = dict.fromkeys(names)
+        self._detected_at: int | None = None
+        self._isolated_at: int | None = None
+        self._fault: str | None = None
+
+    def add(self, verdict: Verdict) -> None:
+        """The next sample."""
+        k = verdict.sample
+        self._states.append(verdict.state)
+        for i, name in enumerate(self._names):
+            step = verdict.steps.get(name)
+            self._alive[k, i] = name in verdict.alive
+            if step is not None:
+                self._seconds[k, i] = step.seconds
+                self._undecided[k, i] = step.verdict == "undecided"
+                if self._died_at[name] is None and not self._alive[k, i]:
+                    self._died_at[name], self._certificates[name] = k, step.certificate
+        if self._detected_at is None:
+            self._detected_at = verdict.detected_at
+        if self._isolated_at is None:
+            self._isolated_at, self._fault = verdict.isolated_at, verdict.fault
+
+    def record(self) -> BankRecord:
+        """Everything so far."""
+        return BankRecord(
+            names=self._names,
+            states=tuple(self._states),
+            alive=self._alive,
+            seconds=self._seconds,
+            undecided=self._undecided,
+            died_at=self._died_at,
+            certificates=self._certificates,
+            detected_at=self._detected_at,
+            isolated_at=self._isolated_at,
+            fault=self._fault,
+        )
