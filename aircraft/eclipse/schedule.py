@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -54,18 +55,25 @@ class ScheduledBlocks:
     step: float
     tables: Mapping[str, Array]
     _flat: Array = field(init=False, repr=False)
+    _layout: tuple[tuple[str, slice, tuple[int, ...]], ...] = field(init=False, repr=False)
     _last: list[tuple[Any, dict[str, Array]]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         points = {len(table) for table in self.tables.values()}
         if len(points) != 1 or points.pop() < 2:
             raise ValueError(f"tables have {[len(t) for t in self.tables.values()]} points; expected one count >= 2")
+        layout, first = [], 0
+        for name, table in self.tables.items():
+            size = int(np.prod(table.shape[1:]))
+            layout.append((name, slice(first, first + size), table.shape[1:]))
+            first += size
         flat = np.hstack([np.asarray(table).reshape(len(table), -1) for table in self.tables.values()])
-        object.__setattr__(self, "_flat", np.ascontiguousarray(flat))
+        object.__setattr__(self, "_flat", flat)
+        object.__setattr__(self, "_layout", tuple(layout))
         object.__setattr__(self, "_last", [(None, {})])
 
     def at(self, schedule: Any) -> dict[str, Array]:
-        """All blocks at one airspeed [m/s]; the arrays are shared, do not write into them.
+        """All blocks at one airspeed [m/s]; the arrays are shared between callers and read-only.
 
         Raises
         ------
@@ -74,25 +82,25 @@ class ScheduledBlocks:
         """
         remembered, blocks = self._last[0]
         if schedule != remembered:
-            blocks = {name: values[0] for name, values in self.over([schedule]).items()}
+            row = self._interpolate(float(schedule))
+            blocks = {name: row[where].reshape(shape) for name, where, shape in self._layout}
             self._last[0] = (schedule, blocks)  # one assignment: safe where observers run in threads
         return blocks
 
     def over(self, schedule: ArrayLike) -> dict[str, Array]:
         """Blocks at many airspeeds (K,): name to (K, ...) array."""
-        airspeed = np.asarray(schedule, dtype=float)
-        if airspeed.ndim != 1 or not np.isfinite(airspeed).all():
-            raise ValueError(f"schedule is {schedule!r}; expected finite airspeeds in m/s")
-        position = np.clip((airspeed - self.start) / self.step, 0.0, len(self._flat) - 1)
-        index = np.minimum(position.astype(int), len(self._flat) - 2)
-        fraction = (position - index)[:, None]
-        rows = (1.0 - fraction) * self._flat[index] + fraction * self._flat[index + 1]
-        blocks, first = {}, 0
-        for name, table in self.tables.items():
-            size = int(np.prod(table.shape[1:]))
-            blocks[name] = rows[:, first : first + size].reshape(len(rows), *table.shape[1:])
-            first += size
-        return blocks
+        rows = np.array([self._interpolate(float(airspeed)) for airspeed in np.asarray(schedule)])
+        return {name: rows[:, where].reshape(len(rows), *shape) for name, where, shape in self._layout}
+
+    def _interpolate(self, airspeed: float) -> Array:
+        if not math.isfinite(airspeed):
+            raise ValueError(f"schedule is {airspeed}; expected a finite airspeed in m/s")
+        position = min(max((airspeed - self.start) / self.step, 0.0), len(self._flat) - 1.0)
+        index = min(int(position), len(self._flat) - 2)
+        fraction = position - index
+        row = (1.0 - fraction) * self._flat[index] + fraction * self._flat[index + 1]
+        row.setflags(write=False)
+        return row
 
     def block(self, name: str) -> Callable[[Any], Array]:
         """One block as a function of the schedule."""

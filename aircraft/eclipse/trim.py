@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
 
+from aircraft.eclipse.derivatives import VALID_AIRSPEED
 from aircraft.eclipse.simulator import Surrogate
 
 Array = NDArray[np.float64]
@@ -46,8 +47,11 @@ def level_trim(surrogate: Surrogate, airspeed: float) -> Trim:
     Raises
     ------
     ValueError
-        If the equations have no solution at that airspeed.
+        If the airspeed is outside the range of the derivatives, 25 to 55 m/s.
     """
+    low, high = VALID_AIRSPEED
+    if not low <= airspeed <= high:
+        raise ValueError(f"airspeed is {airspeed} m/s; expected {low} to {high}, the range of the derivatives")
 
     def residual(unknowns: Array) -> Array:
         trim = Trim(airspeed, *unknowns)
@@ -55,8 +59,8 @@ def level_trim(surrogate: Surrogate, airspeed: float) -> Trim:
 
     guess = np.array([140.0 / airspeed**2, 13800.0 / airspeed**2, 0.13])  # lift = weight fixes alpha V^2 and eta V^2
     answer = root(residual, guess, tol=1e-13)
-    if np.abs(residual(answer.x)).max() > 1e-9:
-        raise ValueError(f"airspeed is {airspeed} m/s: no level trim was found; expected a speed from 25 to 55 m/s")
+    if not np.abs(residual(answer.x)).max() <= 1e-9:  # NaN included
+        raise ValueError(f"surrogate {surrogate} has no level trim at {airspeed} m/s; check its coefficients")
     return Trim(float(airspeed), *(float(v) for v in answer.x))
 
 
