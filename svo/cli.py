@@ -173,9 +173,7 @@ def detect(
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
         with _progress("Samples") as update:
-            found = run_detection(
-                the_plant, samples, noise, source={"log": log.name}, progress=lambda k: update(k, len(samples))
-            )
+            found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
         if out is not None:
             write_detection(out, found)
         if as_json:
@@ -342,21 +340,21 @@ def _print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
 
 def _print_detection(found: Detection) -> None:
     if found.detected_s is None:
-        typer.echo(f"No fault: the nominal model explains all {found.samples} samples ({found.noise} noise).")
+        typer.echo(f"No fault: the nominal model explains all {len(found.time)} samples ({found.noise} noise).")
     else:
         typer.echo(f"Fault detected at {found.detected_s:g} s: the nominal model is falsified ({found.noise} noise).")
         if found.isolated_s is not None:
-            typer.echo(f"Fault isolated at {found.isolated_s:g} s: {found.fault}.")
-        elif found.state == "unexplained":
-            typer.echo("Not isolated: no model explains the data.")
+            typer.echo(f"Fault isolated at {found.isolated_s:g} s: {found.record.fault}.")
         else:
-            typer.echo("Not isolated: more than one fault explains the data.")
-    for name, time in found.died_s.items():
-        typer.echo(f"    {name}: falsified at {time:g} s")
+            why = "more than one fault explains" if found.alive else "no model explains"
+            typer.echo(f"Not isolated: {why} the data.")
+    for alarm in found.alarms:
+        typer.echo(f"    {alarm.observer}: falsified at {alarm.time:g} s")
     for name in found.alive:
         typer.echo(f"    {name}: explains the data to the end")
-    if found.undecided:
-        typer.echo(f"    undecided answers: {found.undecided}")
+    undecided = int(found.record.undecided.sum())
+    if undecided:
+        typer.echo(f"    undecided answers: {undecided}")
 
 
 def _print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:

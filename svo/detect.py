@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.alarms import Alarm, write_alarms
-from svo.isolation.architectures import ArchitectureI, Verdict
+from svo.isolation.architectures import ArchitectureI
+from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
 from svo.plant import Plant
 
@@ -21,52 +22,64 @@ Scheduler = Callable[[NDArray[np.float64]], Any]
 
 @dataclass(frozen=True)
 class Detection:
-    """What a bank said about a log. Times are those of the log [s]; None where it did not happen.
+    """What a bank said about a log, with the log's own times [s].
 
     Attributes
     ----------
     plant, noise : str
-    samples : int
-    detected_s, isolated_s : float or None
-        First falsification of the nominal model, and the first time at which one fault was left.
-    fault : str or None
-        The fault that was isolated.
-    state : str
-        State of the bank at the end: "nominal", "detected", "isolated" or "unexplained".
-    alive : tuple of str
-        Models that still explain the data at the end.
-    died_s : mapping of str to float
-        When each falsified model was falsified.
-    undecided : int
-        Answers that were neither a proof nor a point.
-    changes : tuple of (time, state, alive)
-        The verdict whenever it changed, the first sample included.
+    time : (K,) array
+    record : BankRecord
     alarms : tuple of Alarm
-        Every certified falsification.
+        Every certified falsification, in order of time.
     """
 
     plant: str
     noise: str
-    samples: int
-    detected_s: float | None
-    isolated_s: float | None
-    fault: str | None
-    state: str
-    alive: tuple[str, ...]
-    died_s: Mapping[str, float]
-    undecided: int
-    changes: tuple[tuple[float, str, tuple[str, ...]], ...]
+    time: NDArray[np.float64]
+    record: BankRecord
     alarms: tuple[Alarm, ...]
 
+    @property
+    def detected_s(self) -> float | None:
+        """Time of the first falsification of the nominal model."""
+        return self._at(self.record.detected_at)
+
+    @property
+    def isolated_s(self) -> float | None:
+        """First time at which exactly one fault was left."""
+        return self._at(self.record.isolated_at)
+
+    @property
+    def alive(self) -> tuple[str, ...]:
+        """Models that explain the data to the end."""
+        return self._alive(-1)
+
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the certificates, for JSON."""
-        names = ("plant", "noise", "samples", "detected_s", "isolated_s", "fault", "state", "undecided")
+        """Everything but the certificates, for JSON; ``changes`` lists the verdict whenever it changed."""
+        record = self.record
         return {
-            **{name: getattr(self, name) for name in names},
+            "plant": self.plant,
+            "noise": self.noise,
+            "samples": len(self.time),
+            "state": record.states[-1],
+            "detected_s": self.detected_s,
+            "isolated_s": self.isolated_s,
+            "fault": record.fault,
             "alive": list(self.alive),
-            "died_s": dict(self.died_s),
-            "changes": [{"time_s": t, "state": state, "alive": list(alive)} for t, state, alive in self.changes],
+            "falsified_s": {alarm.observer: alarm.time for alarm in self.alarms},
+            "undecided": int(record.undecided.sum()),
+            "changes": [
+                {"time_s": float(self.time[k]), "state": record.states[k], "alive": list(self._alive(k))}
+                for k in range(len(self.time))
+                if k == 0 or (record.states[k], self._alive(k)) != (record.states[k - 1], self._alive(k - 1))
+            ],
         }
+
+    def _at(self, sample: int | None) -> float | None:
+        return None if sample is None else float(self.time[sample])
+
+    def _alive(self, sample: int) -> tuple[str, ...]:
+        return tuple(name for name, alive in zip(self.record.names, self.record.alive[sample], strict=True) if alive)
 
 
 def verdicts(bank: ArchitectureI, log: Log, scheduler: Scheduler | None = None) -> Iterator[Verdict]:
@@ -89,7 +102,7 @@ def detect(
     noise: str,
     *,
     source: Mapping[str, str] | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Detection:
     """Run a plant's bank over a log and collect what it found.
 
@@ -103,43 +116,23 @@ def detect(
     source : mapping, optional
         Where the log comes from; stored in each alarm beside plant and noise set.
     progress : callable, optional
-        Called with the number of samples done, at each sample.
+        Called with (samples done, samples in all) after each sample.
     """
     bank = plant.bank(noise)
-    origin = {"plant": plant.name, "noise": noise, **(source or {})}
-    alarms: list[Alarm] = []
-    changes: list[tuple[float, str, tuple[str, ...]]] = []
-    detected_s = isolated_s = fault = None
-    undecided = 0
-    living: tuple[str, ...] = tuple(bank.names)
-    for k, verdict in enumerate(verdicts(bank, log, plant.scheduler())):
-        time = float(log.time[k])
-        fallen = [name for name in living if name not in verdict.alive]
-        alarms += [Alarm(name, k, time, verdict.steps[name].certificate, origin) for name in fallen]
-        living = verdict.alive
-        undecided += sum(step.verdict == "undecided" for step in verdict.steps.values())
-        if not changes or changes[-1][1:] != (verdict.state, living):
-            changes.append((time, verdict.state, living))
-        if detected_s is None and verdict.detected_at is not None:
-            detected_s = float(log.time[verdict.detected_at])
-        if isolated_s is None and verdict.isolated_at is not None:
-            isolated_s, fault = float(log.time[verdict.isolated_at]), verdict.fault
+    recorder = Recorder(bank.names, len(log))
+    for verdict in verdicts(bank, log, plant.scheduler()):
+        recorder.add(verdict)
         if progress is not None:
-            progress(k + 1)
-    return Detection(
-        plant=plant.name,
-        noise=noise,
-        samples=len(log),
-        detected_s=detected_s,
-        isolated_s=isolated_s,
-        fault=fault,
-        state=changes[-1][1],
-        alive=living,
-        died_s={alarm.observer: alarm.time for alarm in alarms},
-        undecided=undecided,
-        changes=tuple(changes),
-        alarms=tuple(alarms),
-    )
+            progress(verdict.sample + 1, len(log))
+    record = recorder.record()
+    origin = {"plant": plant.name, "noise": noise, **(source or {})}
+    return Detection(plant.name, noise, log.time, record, alarms_of(record, log, origin))
+
+
+def alarms_of(record: BankRecord, log: Log, source: Mapping[str, str | int | float]) -> tuple[Alarm, ...]:
+    """Every certified falsification of a record, in order of time."""
+    died = sorted((sample, name) for name, sample in record.died_at.items() if sample is not None)
+    return tuple(Alarm(name, k, float(log.time[k]), record.certificates[name], source) for k, name in died)
 
 
 def write_detection(folder: Path, detection: Detection) -> None:

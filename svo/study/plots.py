@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from svo.plant import HEALTHY, Column, Reference
 from svo.study.exemplar import Exemplar, Snapshot
@@ -127,7 +128,7 @@ def plot_bounds(
 def separating_states(exemplar: Exemplar) -> tuple[int, ...]:
     """The two states (or the only one) in which the models' boxes drift furthest apart, relative to their widths."""
     centre, width = (exemplar.lower + exemplar.upper) / 2, exemplar.upper - exemplar.lower
-    both = np.isfinite(centre).all(axis=2)
+    both: NDArray[np.bool_] = np.isfinite(centre).all(axis=2)
     n = exemplar.x.shape[1]
     apart = np.zeros(n)
     for i in range(len(exemplar.names)):

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from svo.alarms import Alarm
-from svo.isolation.architectures import BankRecord
+from svo.detect import alarms_of
+from svo.isolation.record import BankRecord
 from svo.log import Log
 from svo.plant import HEALTHY, Plant
 from svo.study.configuration import Job
@@ -74,7 +75,7 @@ def execute(plant: Plant, job: Job) -> RunOutcome:
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     record = plant.bank(job.noise).run(log)
     exemplar = follow(plant, job, log) if job.exemplary else None
-    return RunOutcome(judge(plant, job, log, record), alarms(plant, job, log, record), exemplar)
+    return RunOutcome(judge(plant, job, log, record), alarms_of(record, log, source_of(plant, job)), exemplar)
 
 
 def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
@@ -86,7 +87,7 @@ def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
     isolated_as = record.fault if isolated is not None else None
     true_died = not healthy and record.died_at[job.fault] is not None
     timely = isolated is not None and isolated >= first_faulty and isolated_as == job.fault
-    seconds = _seconds_of_the_living(record)
+    seconds = record.seconds[~np.isnan(record.seconds)]  # a falsified observer is no longer stepped
     return RunRow(
         run=job.run,
         seed=job.seed,
@@ -106,9 +107,9 @@ def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
     )
 
 
-def alarms(plant: Plant, job: Job, log: Log, record: BankRecord) -> tuple[Alarm, ...]:
-    """Every certified falsification of a run, in order of time."""
-    source: dict[str, str | int | float] = {
+def source_of(plant: Plant, job: Job) -> dict[str, str | int | float]:
+    """Where the alarms of a run come from, as stored with them."""
+    return {
         "plant": plant.name,
         "fault": job.fault,
         "profile": job.profile,
@@ -116,8 +117,6 @@ def alarms(plant: Plant, job: Job, log: Log, record: BankRecord) -> tuple[Alarm,
         "seed": job.seed,
         "run": job.run,
     }
-    died = sorted((sample, name) for name, sample in record.died_at.items() if sample is not None)
-    return tuple(Alarm(name, k, float(log.time[k]), record.certificates[name], source) for k, name in died)
 
 
 def first_faulty_sample(plant: Plant, log: Log) -> int:
@@ -128,9 +127,3 @@ def first_faulty_sample(plant: Plant, log: Log) -> int:
 def _delay(plant: Plant, sample: int | None, first_faulty: int) -> float | None:
     # Counted in samples, so that rounding of times never shows in a delay.
     return None if sample is None else round((sample - first_faulty + 1) * plant.Ts, 12)
-
-
-def _seconds_of_the_living(record: BankRecord) -> np.ndarray:
-    """Times of the observers that were alive before each sample: a falsified one answers at once."""
-    before = np.vstack([np.ones_like(record.alive[:1]), record.alive[:-1]])
-    return record.seconds[before]

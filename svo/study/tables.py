@@ -47,10 +47,9 @@ def not_isolated(summaries: Sequence[ConditionSummary]) -> list[str]:
     lines = []
     for s in summaries:
         if s.survivors:
-            who = "; ".join(f"{names} alive at the end in {count}" for names, count in s.survivors.items())
-            lines.append(
-                f"{s.fault} {s.profile} ({s.noise}): {sum(s.survivors.values())} of {s.runs} runs not isolated: {who}"
-            )
+            who = "; ".join(f"{names} ({count})" for names, count in s.survivors.items())
+            runs = f"{sum(s.survivors.values())} of {s.runs} runs"
+            lines.append(f"not isolated, {s.noise} noise: {s.fault} {s.profile} in {runs}; alive at the end: {who}")
     return lines
 
 

@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from svo.cli import app
+
+
+def svo(*arguments: str | Path) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def one_line(result: Any) -> str:
+    """The error of a command that failed as it should."""
+    assert result.exit_code == 1
+    lines = [line for line in result.stderr.splitlines() if line.startswith("error:")]
+    assert len(lines) == 1
+    assert "Traceback" not in result.output + result.stderr
+    return lines[0]
+
+
+@pytest.fixture
+def log(registered_tank: str, tmp_path: Path) -> Path:
+    path = tmp_path / "log.csv"
+    result = svo(
+        "simulate", "tank", "--fault", "gauge", "--profile", "step", "--noise", "calm", "--seed", "4", "--out", path
+    )
+    assert result.exit_code == 0, result.output
+    return path
+
+
+def edited(log: Path, line: int, column: str, cell: str) -> Path:
+    rows = [row.split(",") for row in log.read_text().splitlines()]
+    rows[line - 1][rows[0].index(column)] = cell
+    log.write_text("".join(",".join(row) + "\n" for row in rows))
+    return log
+
+
+def test_plants_are_listed_with_what_they_have(registered_tank: str) -> None:
+    assert "tank: Water tank <with> two gauges" in svo("plants").stdout
+    every = {plant["name"]: plant for plant in json.loads(svo("plants", "--json").stdout)}
+    assert every["tank"]["faults"] == {"leak": ["step", "ramp"], "gauge": ["step"]}
+    assert [column["name"] for column in every["tank"]["columns"]["outputs"]] == ["gauge_1", "gauge_2"]
+    assert every["eclipse"]["Ts"] == 0.01
+
+
+@pytest.mark.parametrize("command", ["plants", "study", "simulate", "detect", "verify"])
+def test_every_command_has_help_with_an_example(command: str) -> None:
+    result = svo(command, "--help")
+    assert result.exit_code == 0
+    assert f"Example: svo {command}" in " ".join(result.stdout.split())
+
+
+def test_the_module_is_the_command(registered_tank: str) -> None:
+    done = subprocess.run([sys.executable, "-m", "svo", "plants"], capture_output=True, text=True, check=True)
+    assert "tank:" in done.stdout
+
+
+def test_start_up_imports_nothing_heavy() -> None:
+    heavy = ("numba", "scipy", "matplotlib", "pyarrow", "flint")
+    code = f"import sys, svo.cli; print([name for name in {heavy} if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_a_log_is_detected_on_and_its_alarms_are_verified(log: Path, tmp_path: Path) -> None:
+    found = svo("detect", "tank", log, "--out", tmp_path / "found")
+    assert found.exit_code == 0
+    assert "Fault detected at 1 s" in found.stdout
+    assert "Fault isolated at 1 s: gauge" in found.stdout
+    assert "leak: falsified at 1 s" in found.stdout
+    assert "gauge: explains the data to the end" in found.stdout
+    verdict = json.loads((tmp_path / "found" / "verdict.json").read_text())
+    assert verdict["falsified_s"] == {"nominal": 1.0, "leak": 1.0}
+    assert [change["state"] for change in verdict["changes"]] == ["nominal", "isolated"]
+    alarms = tmp_path / "found" / "alarms.jsonl"
+    assert "2 of 2 alarms proven" in svo("verify", alarms).stdout
+    assert svo("verify", alarms, "--log", log).exit_code == 0
+    checks = json.loads(svo("verify", alarms, "--json").stdout)
+    assert [check["ok"] for check in checks] == [True, True]
+
+
+def test_alarms_do_not_verify_against_another_log(log: Path, tmp_path: Path) -> None:
+    svo("detect", "tank", log, "--out", tmp_path)
+    edited(log, 12, "gauge_1", "1.4142")
+    result = svo("verify", tmp_path / "alarms.jsonl", "--log", log)
+    assert result.exit_code == 1
+    assert "0 of 2 alarms proven" in result.stdout
+    assert "line 1" in result.stderr
+
+
+def test_an_alarm_with_a_changed_number_is_rejected(log: Path, tmp_path: Path) -> None:
+    svo("detect", "tank", log, "--out", tmp_path)
+    alarms = tmp_path / "alarms.jsonl"
+    alarms.write_text(
+        alarms.read_text().replace('"sample": 10', '"sample": 11', 1).replace('"sample":10', '"sample":11', 1)
+    )
+    result = svo("verify", alarms)
+    assert result.exit_code == 1
+    assert "1 of 2 alarms proven" in result.stdout
+
+
+def test_a_healthy_log_has_no_fault(registered_tank: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    assert svo("simulate", "tank", "--out", path).exit_code == 0
+    result = svo("detect", "tank", path)
+    assert result.exit_code == 0
+    assert "No fault: the nominal model explains all 40 samples" in result.stdout
+    assert json.loads(svo("detect", "tank", path, "--json").stdout)["alive"] == ["nominal", "leak", "gauge"]
+
+
+def test_a_missing_measurement_is_no_alarm_and_no_error(registered_tank: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    svo("simulate", "tank", "--out", path)
+    for line, column in ((2, "gauge_1"), (7, "gauge_1"), (7, "gauge_2")):
+        edited(path, line, column, "")
+    assert "No fault" in svo("detect", "tank", path).stdout
+
+
+@pytest.mark.parametrize(
+    ("line", "column", "cell", "expected"),
+    [
+        (1, "gauge_1", "gauge one", "no column 'gauge_1'"),
+        (5, "gauge_1", "inf", "line 5, column 'gauge_1': 'inf' is not a finite number"),
+        (5, "inflow", "", "line 5, column 'inflow': the cell is empty or NaN"),
+        (5, "time_s", "0.2", "line 5, column 'time_s'"),
+        (5, "time_s", "0.35", "expected the model's sampling time 0.1 s"),
+        (5, "gauge_1", "3,4", "line 5: 6 cells; expected 5"),
+    ],
+)
+def test_a_bad_log_is_one_line(log: Path, line: int, column: str, cell: str, expected: str) -> None:
+    assert expected in one_line(svo("detect", "tank", edited(log, line, column, cell)))
+
+
+def test_what_does_not_exist_is_one_line(log: Path, tmp_path: Path) -> None:
+    assert "no plant is registered as 'tunk'" in one_line(svo("detect", "tunk", log))
+    assert "has no noise set 'loud'; it has calm, rough" in one_line(svo("detect", "tank", log, "--noise", "loud"))
+    assert "missing.csv: No such file" in one_line(svo("detect", "tank", tmp_path / "missing.csv"))
+    assert "missing.jsonl: No such file" in one_line(svo("verify", tmp_path / "missing.jsonl"))
+    assert "Is a directory" in one_line(svo("detect", "tank", tmp_path))
+    simulate = ("simulate", "tank", "--out", tmp_path / "x.csv")
+    assert "has no fault 'rust'" in one_line(svo(*simulate, "--fault", "rust"))
+    assert "has no profile 'soft'; it has step" in one_line(svo(*simulate, "--fault", "gauge", "--profile", "soft"))
+    assert "given without a fault" in one_line(svo(*simulate, "--profile", "step"))
+    assert "No such file" in one_line(svo("simulate", "tank", "--out", tmp_path / "no" / "x.csv"))
+    assert not (tmp_path / "x.csv").exists()
+
+
+def test_a_study_prints_its_table_and_writes_its_files(registered_tank: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = ("study", "tank", "--runs", "2", "--workers", "1", "--noise", "calm", "--noise", "rough", "--out", out)
+    result = svo(*command)
+    assert result.exit_code == 0, result.stderr
+    assert "Fault-free runs with an alarm: 0 of 2" in result.stdout
+    assert "Runs with a wrong isolation: 0 of 8" in result.stdout
+    assert "about 0.3" in result.stdout
+    names = {path.name for path in out.iterdir()}
+    assert names >= {"runs.parquet", "summary.csv", "alarms.jsonl", "report.html", "delays_calm.png", "alive_rough.png"}
+    assert "is not empty; give --resume" in one_line(svo(*command))
+    again = json.loads(svo(*command, "--resume", "--json").stdout)
+    assert again["configuration"]["runs"] == 2
+    assert len(again["summary"]) == 8
+    assert "noise was" in one_line(svo("study", "tank", "--runs", "2", "--out", out, "--resume"))
+    assert svo("verify", out / "alarms.jsonl").exit_code == 0
+
+
+def test_a_row_of_the_run_table_can_be_simulated_and_verified(registered_tank: str, tmp_path: Path) -> None:
+    from svo.study.store import StudyFolder
+
+    svo("study", "tank", "--runs", "1", "--workers", "1", "--fault", "gauge", "--out", tmp_path / "out")
+    row = StudyFolder(tmp_path / "out").rows()[0]
+    log = tmp_path / "log.csv"
+    seed = str(row.seed)
+    svo(
+        "simulate",
+        "tank",
+        "--fault",
+        row.fault,
+        "--profile",
+        row.profile,
+        "--noise",
+        row.noise,
+        "--seed",
+        seed,
+        "--out",
+        log,
+    )
+    assert svo("verify", tmp_path / "out" / "alarms.jsonl", "--log", log).exit_code == 0
+    found = json.loads(svo("detect", "tank", log, "--json").stdout)
+    assert found["detected_s"] == row.first_alarm_s
