@@ -1,0 +1,364 @@
+"""The moving-horizon set-valued observer: lifted rows, one linear program decides, a smoothed arrival set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes import HPolytope
+from svo.log import Log
+from svo.model import UncertainModel
+from svo.observers import window_kernel as kernel
+from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
+from svo.observers.step import VerdictName
+
+Array = NDArray[np.float64]
+_GROWING_START = 16
+_LARGEST_BASIS = 128
+
+
+class WindowObserver:
+    """Set-valued observer over a moving window of N steps (the lifted form of paper 002, section 2).
+
+    The window holds the state at its first sample, every disturbance and every channel of uncertainty since;
+    measurements inside it stay valid, and one linear program decides whether anything explains them. When the
+    window slides, the new first state is bounded in the template's directions by all data of the window.
+
+    Parameters
+    ----------
+    model : UncertainModel
+    initial : HPolytope
+        Bounded set that contains the state at the first sample.
+    horizon : int or None
+        Steps N >= 1 in the window; None keeps all data since the start (full information, memory O(K^2)).
+    template : "box" or (r, n) array
+        Directions, besides the axes, in which the arrival set is bounded.
+    eps : float
+        Every measurement row is widened by eps (|y| + |C||x|max + |D u| + |c| + |F| wmax + n), for the rounding
+        of the data.
+
+    Notes
+    -----
+    Guarantees. The true state stays inside `Step.set` and the verdict is never "falsified" while the plant
+    keeps to the model; "falsified" comes with a `WindowCertificate` that was checked in exact arithmetic.
+    After it the observer stays falsified until `reset`.
+    """
+
+    def __init__(
+        self,
+        model: UncertainModel,
+        initial: HPolytope,
+        horizon: int | None = 10,
+        template: str | ArrayLike = "box",
+        eps: float = 1e-9,
+    ) -> None:
+        if not isinstance(model, UncertainModel):
+            raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
+        if horizon is not None and (not isinstance(horizon, int | np.integer) or horizon < 1):
+            raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
+        if not (np.isfinite(eps) and eps >= 0):
+            raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
+        self.model = model
+        self.horizon = None if horizon is None else int(horizon)
+        self.eps = float(eps)
+        self._template = _template_rows(template, model.n_states)
+        self._owner = _channel_owners(model)
+        self._late = _output_is_disturbed(model)
+        self.reset(initial)
+
+    # -- the protocol ----------------------------------------------------------------------------
+
+    def reset(self, set: HPolytope) -> None:
+        """Forget all data; the state at the next measurement lies in ``set``.
+
+        Raises
+        ------
+        ValueError
+            If the set is empty, unbounded or of the wrong dimension.
+        """
+        lower, upper = _finite_box(set, self.model.n_states)
+        rows, low, high = _rows_of(set)
+        self._initial = ArrivalSet(lower, upper, rows, low, high)
+        self._allocate(self.horizon or _GROWING_START)
+        self._arrays["h_lower"][: lower.size], self._arrays["h_upper"][: upper.size] = lower, upper
+        kernel.initialise(self._window, self._size, rows, low, high)
+        self._falsified: WindowCertificate | None = None
+        self._last_bounds: tuple[Array, Array] | None = None
+
+    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> WindowStep:
+        """The first measurement, without a transition.
+
+        Parameters
+        ----------
+        y0 : (ny,) array
+            NaN = that sensor is missing.
+        u : (nu,) array, optional
+            Needed only if D or a D_i is not zero.
+        schedule : optional
+            Scheduling value at this sample.
+        """
+        begun = perf_counter()
+        if self._started:
+            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
+        y = self._outputs(y0)
+        inputs = self._inputs("u", u, self.model.uses_input_in_output)
+        stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
+        return self._sample(True, inputs, inputs, y, stack, noise, (w_lower, w_upper), begun)
+
+    def step(
+        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
+    ) -> WindowStep:
+        """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
+
+        Parameters
+        ----------
+        u : (nu,) array
+        y : (ny,) array
+            NaN = that sensor is missing; all NaN = prediction only.
+        u_next : (nu,) array, optional
+            u(k+1); needed only if D or a D_i is not zero.
+        schedule : optional
+            Scheduling value at the sample of y; it also gives the matrices of the next transition.
+
+        Raises
+        ------
+        ValueError
+            For a wrong shape, an infinite or missing value, or a schedule that gives no finite matrices. The
+            observer is unchanged.
+        """
+        begun = perf_counter()
+        if self._falsified is not None:
+            return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
+        outputs = self._outputs(y)
+        inputs = self._inputs("u", u, True)
+        following = self._inputs("u_next", u_next, True) if self.model.uses_input_in_output else inputs
+        stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
+        if not self._started:
+            self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
+        if self.horizon is None and self._time + 1 >= self._size.N:
+            self._grow()
+        return self._sample(False, inputs, following, outputs, stack, noise, (w_lower, w_upper), begun)
+
+    def run(self, log: Log) -> WindowRecord:
+        """All samples of a log, with the box of the state at each."""
+        steps, lower, upper = [], [], []
+        for k in range(len(log)):
+            following = log.u[k] if self.model.uses_input_in_output else None
+            schedule = log.schedule_at(k)
+            step = self.update(log.y[k], following, schedule) if k == 0 else self.step(log.u[k - 1], log.y[k], following, schedule)
+            box = step.box
+            steps.append(step)
+            lower.append(box[0])
+            upper.append(box[1])
+        return WindowRecord(
+            verdicts=tuple(s.verdict for s in steps),
+            lower=np.array(lower),
+            upper=np.array(upper),
+            seconds=np.array([s.seconds for s in steps]),
+            certificate=self._falsified,
+        )
+
+    def warm_up(self) -> float:
+        """Compile everything that a step can call, without touching this observer; returns the seconds it took."""
+        begun = perf_counter()
+        other = WindowObserver.__new__(WindowObserver)
+        other.__dict__.update(self.__dict__)
+        other.reset(HPolytope.box(self._initial.box_lower, self._initial.box_upper))
+        y, u = np.full(self.model.n_outputs, np.nan), np.zeros(self.model.n_inputs)
+        schedule = self.model.schedule
+        other.update(y, u, schedule)
+        other.step(u, y, u, schedule).box  # noqa: B018
+        kernel.channel_factors(self.model.stack(schedule), self._owner)
+        return perf_counter() - begun
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    @property
+    def _time(self) -> int:
+        return int(self._arrays["clock"][kernel.TIME])
+
+    @property
+    def _started(self) -> bool:
+        return bool(self._arrays["clock"][kernel.STARTED])
+
+    def _allocate(self, steps: int) -> None:
+        model, polytope = self.model, self.model.disturbance_polytope
+        w_rows = _rows_of(polytope) if polytope is not None else (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0))
+        n = model.n_states
+        nv, nr = model.n_disturbances + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
+        na = max(len(self._template), len(self._initial.rows))
+        rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
+        self._size = kernel.Sizes(
+            n=n, nu=model.n_inputs, nw=model.n_disturbances, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
+            nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps,
+            K=min(rows, columns, _LARGEST_BASIS) + 2, late=int(self._late),
+        )  # fmt: skip
+        w = self._arrays = kernel.allocate(self._size)
+        w["T"][:n] = np.eye(n)
+        w["T"][n:] = self._template
+        w["owner"][:] = self._owner
+        w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
+        w["w_rows"][:], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
+        self._window = kernel.new_window(w)
+
+    def _grow(self) -> None:
+        """Twice the room; nothing has wrapped around yet, so every array is a leading block of the larger one."""
+        old = self._arrays
+        self._allocate(2 * self._size.N)
+        for name, small in old.items():
+            self._arrays[name][tuple(slice(0, length) for length in small.shape)] = small
+
+    def _evaluate(self, schedule: Any) -> tuple[Array, tuple[Array, Array, Array]]:
+        if self.model.is_scheduled and schedule is None:
+            raise ValueError("schedule is missing: the model has arrays that are functions of it, so pass schedule=...")
+        return self.model.stack(schedule), self.model.bounds(schedule)
+
+    def _outputs(self, y: ArrayLike) -> Array:
+        array = np.asarray(y, dtype=float)
+        if array.shape != (self.model.n_outputs,):
+            raise ValueError(f"y has shape {array.shape}; expected ({self.model.n_outputs},), one value a sensor")
+        if np.isinf(array).any():
+            raise ValueError(f"y is {array}; expected finite numbers, or NaN for a missing sensor")
+        return array
+
+    def _inputs(self, name: str, u: ArrayLike | None, needed: bool) -> Array:
+        size = self.model.n_inputs
+        if u is None and (size == 0 or not needed):
+            return np.zeros(size)
+        if u is None:
+            raise ValueError(f"{name} is missing; expected shape ({size},)" + (", since D or a D_i is not zero" if name != "u" else ""))
+        array = np.asarray(u, dtype=float)
+        if array.shape != (size,):
+            raise ValueError(f"{name} has shape {array.shape}; expected ({size},), one value an input")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} is {array}; expected finite numbers")
+        return array
+
+    def _arrival(self) -> ArrivalSet:
+        if self._arrays["clock"][kernel.BASE] == 0:
+            return self._initial
+        n, lower, upper = self.model.n_states, self._arrays["h_lower"].copy(), self._arrays["h_upper"].copy()
+        return ArrivalSet(lower[:n], upper[:n], self._template, lower[n:], upper[n:])
+
+    def _sample(
+        self, first: bool, u: Array, u_next: Array, y: Array, stack: Array, noise: Array, w: tuple[Array, Array], begun: float
+    ) -> WindowStep:
+        w_old = self._last_bounds or w
+        code = kernel.enter(self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
+        if code == kernel.BAD_NUMBER:
+            raise ValueError("the model's matrices at this schedule contain NaN or Inf; expected finite numbers")
+        if code == kernel.RANK_ROSE:
+            raise ValueError("an uncertainty has a higher rank at this sample than at the model's typical schedule")
+        if code == kernel.SIGN_OPEN:
+            self._solve(kernel.CHANNELS)
+        kernel.complete(self._window, self._size, first, self.eps)
+        self._last_bounds = w
+        verdict = self._solve(kernel.ARRIVAL)
+        return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+
+    def _solve(self, task: int) -> VerdictName:
+        """Solve the programs of a task; an empty window counts only once its certificate is proven."""
+        start = 0
+        while True:
+            verdict, program = kernel.solve(self._window, self._size, task, start, kernel.PIVOT_LIMIT)
+            if verdict != kernel.EMPTY_CANDIDATE:
+                return "consistent" if verdict == kernel.CONSISTENT else "undecided"
+            if task == kernel.ARRIVAL:
+                certificate = certificate_of(self._arrays, self._size, self._arrival())
+                if certificate.verify():
+                    self._falsified = certificate
+                    return "falsified"
+            start = program + 1
+
+    def _box_at(self, sample: int) -> tuple[Array, Array]:
+        if self._falsified is not None:
+            nothing = np.full(self.model.n_states, np.nan)
+            return nothing, nothing.copy()
+        if sample != self._time:
+            raise ValueError(f"the box of sample {sample} was not read before sample {self._time}; read it right after its step, or use run(log)")
+        self._solve(kernel.NEWEST)
+        return self._arrays["box_lower"].copy(), self._arrays["box_upper"].copy()
+
+
+@dataclass(frozen=True, slots=True)
+class WindowStep:
+    """Answer of a `WindowObserver` at one sample; see `svo.observers.step.Step`.
+
+    `box` and `set` are computed when they are read, which must be before the observer's next sample.
+    """
+
+    observer: WindowObserver
+    sample: int
+    verdict: VerdictName
+    certificate: WindowCertificate | None
+    seconds: float
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """Outer bounds (lower, upper) of the state at this sample; NaN once the model is falsified."""
+        return self.observer._box_at(self.sample)
+
+    @property
+    def set(self) -> HPolytope:
+        """The box as a polytope; empty once the model is falsified."""
+        lower, upper = self.box
+        return HPolytope.empty(lower.size) if np.isnan(lower).any() else HPolytope.box(lower, upper)
+
+
+@dataclass(frozen=True)
+class WindowRecord:
+    """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified."""
+
+    verdicts: tuple[VerdictName, ...]
+    lower: Array
+    upper: Array
+    seconds: Array
+    certificate: WindowCertificate | None
+
+
+def _template_rows(template: str | ArrayLike, n: int) -> Array:
+    if isinstance(template, str):
+        if template != "box":
+            raise ValueError(f"template is {template!r}; expected 'box' or an array (rows, {n}) of directions")
+        return np.zeros((0, n))
+    rows = np.array(template, dtype=float)
+    if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
+        raise ValueError(f"template has shape {rows.shape}; expected finite directions of shape (rows, {n})")
+    return rows
+
+
+def _channel_owners(model: UncertainModel) -> NDArray[np.int64]:
+    """For each channel, the item of the stack that it belongs to."""
+    stack = model.stack(model.schedule)
+    owners = [item for item in range(1, len(stack)) for _ in range(int(np.linalg.matrix_rank(stack[item], rtol=1e-12)))]
+    return np.array(owners, dtype=np.int64)
+
+
+def _output_is_disturbed(model: UncertainModel) -> bool:
+    """Whether w or a channel enters the output."""
+    stack, layout = model.stack(model.schedule), model.layout
+    return bool(np.any(stack[0, layout.n :, layout.n + layout.nu + 1 :]) or np.any(stack[1:, layout.n :]))
+
+
+def _rows_of(P: HPolytope) -> tuple[Array, Array, Array]:
+    """Rows of a polytope that are no bounds on single variables, two-sided; equalities have both sides equal."""
+    rows = np.vstack([P.A, P.C])
+    lower = np.concatenate([np.full(len(P.b), -np.inf), P.d])
+    upper = np.concatenate([P.b, P.d])
+    joint = np.count_nonzero(rows, axis=1) > 1
+    return rows[joint], lower[joint], upper[joint]
+
+
+def _finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
+    if not isinstance(P, HPolytope):
+        raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
+    if P.dim != n:
+        raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
+    lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
+    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+        raise ValueError("initial is empty or unbounded; expected a bounded nonempty set of first states")
+    return lower, upper
