@@ -54,14 +54,18 @@ class BandLimitedNoise:
         object.__setattr__(self, "cutoffs_hz", cutoffs)
 
     def draw(self, samples: int, rng: np.random.Generator) -> Array:
-        """A stationary realisation, (samples, channels); the filters have settled before its first row."""
-        channels = zip(np.asarray(self.bounds), np.asarray(self.cutoffs_hz), strict=True)
-        return np.column_stack([self._channel(samples, bound, cutoff, rng) for bound, cutoff in channels])
+        """A stationary realisation, (samples, channels); the filters have settled before its first row.
 
-    def _channel(self, samples: int, bound: float, cutoff: float, rng: np.random.Generator) -> Array:
-        sections, settling, gain = _low_pass(float(cutoff), self.Ts)
-        coloured = sosfilt(sections, rng.uniform(-1.0, 1.0, settling + samples))[settling:]
-        return np.clip(coloured * (RMS_PER_BOUND * bound / gain), -bound, bound)
+        From the same generator state a longer realisation begins with the shorter one.
+        """
+        filters = [_low_pass(float(cutoff), self.Ts) for cutoff in np.asarray(self.cutoffs_hz)]
+        settling = max((length for _, length, _ in filters), default=0)
+        coloured = rng.uniform(-1.0, 1.0, (settling + samples, len(filters)))
+        for column, (sections, _, _) in zip(coloured.T, filters, strict=True):
+            column[:] = sosfilt(sections, column)
+        gains = np.array([gain for _, _, gain in filters])
+        bounds = np.asarray(self.bounds)
+        return np.clip(coloured[settling:] * (RMS_PER_BOUND * bounds / gains), -bounds, bounds)
 
 
 @cache

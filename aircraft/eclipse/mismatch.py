@@ -57,7 +57,7 @@ def mismatch(run: Run, scenarios: Scenarios) -> Mismatch:
 def largest(scenarios: Scenarios, fault: str, noise: str, runs: int) -> MismatchBounds:
     """The largest mismatch seen over ``runs`` flights of each profile of a fault (or fault-free)."""
     state, output = np.zeros(4), np.zeros(4)
-    for seed in _seeds(noise, fault, runs):
+    for seed in seeds(noise, fault, runs):
         for profile in PROFILES if fault != HEALTHY else ("",):
             seen = mismatch(scenarios.run(fault, profile, noise, seed), scenarios)
             state = np.maximum(state, np.abs(seen.state).max(axis=0))
@@ -83,7 +83,7 @@ def _apply(matrices: Array, vectors: Array) -> Array:
     return np.einsum("kij,kj->ki", matrices, vectors)
 
 
-def _seeds(noise: str, fault: str, runs: int) -> Iterator[np.random.SeedSequence]:
+def seeds(noise: str, fault: str, runs: int) -> Iterator[np.random.SeedSequence]:
     branch = (SPAWN_KEY, list(NOISE_SETS).index(noise), (HEALTHY, *FAULTS).index(fault))
     return (np.random.SeedSequence(0, spawn_key=(*branch, i)) for i in range(runs))
 

@@ -34,8 +34,9 @@ class NoiseSet:
 
     def draw(self, samples: int, Ts: float, rng: np.random.Generator) -> tuple[Array, Array]:
         """Sensor noise (samples, 4) and gusts (samples, 3), each within its bounds."""
-        sensors = BandLimitedNoise(self.sensors, np.full(4, SENSOR_CUTOFF_HZ), Ts).draw(samples, rng)
-        return sensors, BandLimitedNoise(self.gusts, GUST_CUTOFFS_HZ, Ts).draw(samples, rng)
+        cutoffs = (*(SENSOR_CUTOFF_HZ,) * len(self.sensors), *GUST_CUTOFFS_HZ)
+        drawn = BandLimitedNoise((*self.sensors, *self.gusts), cutoffs, Ts).draw(samples, rng)
+        return drawn[:, :4], drawn[:, 4:]
 
 
 _DEGREE = float(np.pi / 180)

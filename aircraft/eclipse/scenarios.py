@@ -101,7 +101,7 @@ class Scenarios:
     def run(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Run:
         """Fly once from the trim at 37 m/s; ``fault`` may be "none"."""
         samples = round(self.duration(fault, profile) / self.model.Ts)
-        time = np.arange(samples) * self.model.Ts
+        time = np.arange(samples, dtype=np.float64) * float(self.model.Ts)
         active = None if fault == HEALTHY else self.fault(fault, profile)
         sensor_noise, gusts = NOISE_SETS[_known(noise)].draw(samples, self.model.Ts, np.random.default_rng(seed))
         corruption = corrupt(active, time, self.model.moment_reference)

@@ -41,6 +41,12 @@ def test_spectrum_falls_by_half_at_the_cut_off_and_by_40_db_a_decade():
     assert power[np.argmin(abs(frequency - 8.0))] / level < 0.006
 
 
+def test_longer_run_begins_with_the_shorter_one():
+    noise = BandLimitedNoise([1.0, 2.0], [0.5, 20.0], 0.01)
+    short, long = (noise.draw(samples, np.random.default_rng(7)) for samples in (300, 500))
+    np.testing.assert_array_equal(short, long[:300])
+
+
 def test_same_seed_same_noise():
     noise = BandLimitedNoise([1.0, 2.0], [0.5, 20.0], 0.01)
     first, second = (noise.draw(500, np.random.default_rng(7)) for _ in range(2))

