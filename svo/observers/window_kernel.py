@@ -116,19 +116,16 @@ WINDOW = WindowType(
     + [(k, _array_type(types.int64, s)) for k, s in INTEGERS.items()]
 )
 
-def _binder() -> Any:
-    """Compiled constructor of a window from its arrays in the order of the tables.
-
-    Its text is compiled under this file's name, so that Numba can cache it beside the rest.
-    """
+def _constructor_text() -> str:
+    """Source of the compiled constructor: it must name every array, so it is written from the tables."""
     names = [*FLOATS, *INTEGERS]
-    lines = [f"def bind({', '.join(names)}):", "    w = new(WINDOW)", *(f"    w.{k} = {k}" for k in names), "    return w"]
-    scope: dict[str, Any] = {"new": structref.new, "WINDOW": WINDOW}
-    exec(compile("\n".join(lines), __file__, "exec"), scope)
-    return njit(cache=True)(scope["bind"])
+    lines = [f"def _construct({', '.join(names)}):", "    w = structref.new(WINDOW)", *(f"    w.{k} = {k}" for k in names)]
+    return "\n".join([*lines, "    return w"])
 
 
-_bind = _binder()
+# under this file's name and in its globals, so that Numba caches it with the rest
+exec(compile(_constructor_text(), __file__, "exec"), globals())
+_construct = njit(cache=True)(globals()["_construct"])
 
 
 # -- linear algebra on short rows --------------------------------------------------------------------------
@@ -1489,4 +1486,4 @@ def initialise(w, size, rows, rows_lower, rows_upper):
 
 def new_window(arrays: dict[str, Any]) -> Any:
     """A window that compiled code can take, over the arrays of `allocate`."""
-    return _bind(*arrays.values())
+    return _construct(*arrays.values())
