@@ -71,8 +71,8 @@ def _pictures(
             title = f"Sets of the models and the true state, {noise} noise"
             text = (
                 "Projections on the two states in which the models drift furthest apart, in the slowest exemplary run "
-                "of each fault: at the last samples before models are falsified, and at the end. "
-                "The cross is the true state."
+                "of each fault, at the last samples before models are falsified. The cross is the true state; a model "
+                "is falsified when its set becomes empty."
             )
             yield _save(folder / f"sets_{noise}.png", _sets(plant, slow), title, text)
         title = f"Bounds and true state, {noise} noise"
@@ -112,47 +112,61 @@ def _alive(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
             ax.set_title(f"{exemplar.fault}, {exemplar.profile}")
             if ax is not row[0]:
                 ax.set_yticklabels([])
+            if row is not axes[-1]:
+                ax.set_xlabel("")
         for ax in row[len(chosen) :]:
             ax.set_axis_off()
     return figure
 
 
 def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib.ticker import MaxNLocator
 
-    columns = max(len(e.snapshots) for e in exemplars)
-    figure = _figure(3.0 * columns + 0.4, 2.6 * len(exemplars) + 0.4)
+    # The end of a run, with one set left, says nothing where there is something to see before.
+    shown = [e.snapshots[:-1] or e.snapshots for e in exemplars]
+    columns = max(len(snapshots) for snapshots in shown)
+    figure = _figure(3.4 * columns + 0.4, 2.7 * len(exemplars) + 0.4)
     axes = figure.subplots(len(exemplars), columns, squeeze=False)
-    for row, exemplar in zip(axes, exemplars, strict=True):
+    for row, exemplar, snapshots in zip(axes, exemplars, shown, strict=True):
         dims = plots.separating_states(exemplar)
-        for ax, snapshot in zip(row, exemplar.snapshots, strict=False):
+        for ax, snapshot in zip(row, snapshots, strict=False):
             plots.plot_sets(exemplar, snapshot, dims, plant.columns.states, ax)
-            delay = exemplar.time[snapshot.sample] - plant.fault_time + plant.Ts
-            ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {delay:+.2f} s", fontsize=9.5)
-            ax.text(0, 1.0, snapshot.event, transform=ax.transAxes, fontsize=8, color="#3B434B", va="bottom")
-        for ax in row[len(exemplar.snapshots) :]:
+            after = exemplar.time[snapshot.sample] - plant.fault_time
+            ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {after:+.2f} s\n{snapshot.event}", fontsize=9.5)
+            ax.xaxis.set_major_locator(MaxNLocator(4))
+            ax.yaxis.set_major_locator(MaxNLocator(5))
+        for ax in row[len(snapshots) :]:
             ax.set_axis_off()
-    names = exemplars[0].names
-    handles: list[Patch | Line2D] = [
-        Patch(label=name, **plots.face(colour)) for name, colour in plots.colours(names).items()
-    ]
-    handles.append(Line2D([], [], marker="x", linestyle="", color="#111111", markeredgewidth=1.8, label="true state"))
-    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    _model_legend(figure, exemplars[0].names)
     return figure
 
 
 def _bounds(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
     columns = min(2, len(plant.columns.states))
-    figure = _figure(4.1 * columns, 2.3 * len(exemplars) + 0.3)
+    figure = _figure(4.6 * columns, 2.2 * len(exemplars) + 0.4)
     axes = figure.subplots(len(exemplars), columns, squeeze=False)
     for row, exemplar in zip(axes, exemplars, strict=True):
+        window = plots.time_window(exemplar, plant.fault_time, plant.Ts)
         for ax, state in zip(row, plots.separating_states(exemplar), strict=True):
             plots.plot_bounds(exemplar, state, plant.columns.states, plant.fault_time, ax)
-            plots.zoom(ax, exemplar, state, plant.fault_time, plots.time_window(exemplar, plant.fault_time, plant.Ts))
+            plots.zoom(ax, exemplar, state, plant.fault_time, window)
         row[0].set_title(f"{exemplar.fault}, {exemplar.profile}")
-        row[0].legend(loc="best", fontsize=8)
+    for ax in axes[:-1].ravel():
+        ax.set_xlabel("")
+    _model_legend(figure, exemplars[0].names)
     return figure
+
+
+def _model_legend(figure: Figure, names: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Patch | Line2D] = [
+        Patch(label=f"{name} model", edgecolor=colour, facecolor=(colour, 2.5 * plots.FILL), linewidth=1.5)
+        for name, colour in plots.colours(names).items()
+    ]
+    handles.append(Line2D([], [], color="#111111", marker="x", markeredgewidth=1.8, linewidth=1.1, label="true state"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
 
 
 def _slowest(exemplars: Sequence[Exemplar]) -> list[Exemplar]:

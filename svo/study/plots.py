@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # Okabe and Ito's colours, told apart by colour-blind readers; the first is the nominal model's.
 COLOURS = ("#5B6470", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+FILL = 0.14  # opacity of a set, so that those behind it are seen
 DETECT, ISOLATE, PAPER = "#56B4E9", "#0072B2", "#D55E00"
 
 
@@ -97,9 +98,13 @@ def plot_sets(
     tone = colours(exemplar.names)
     artists: list[Artist] = []
     for name, polytope in snapshot.sets.items():
-        artists += _as_list(polytope.plot(ax=ax, dims=dims, **face(tone[name])))
+        drawn = polytope.plot(ax=ax, dims=dims, color=tone[name], linewidth=1.6)
+        for patch in set(drawn) & set(ax.patches):
+            patch.set(alpha=None, edgecolor=tone[name], facecolor=(tone[name], FILL))
+        artists += drawn
     true = exemplar.x[snapshot.sample, list(dims)]
     artists += ax.plot(*true, "x", color="#111111", markersize=7, markeredgewidth=1.8, zorder=5)
+    ax.margins(0.08)
     ax.set_xlabel(_label(states[dims[0]]))
     ax.set_ylabel(_label(states[dims[1]]))
     return artists
@@ -194,14 +199,6 @@ def _reference_marks(ax: Axes, at: np.ndarray, texts: Sequence[str]) -> list[Art
 
 def _fault_line(ax: Axes) -> Artist:
     return ax.axvline(0.0, color="#111111", linewidth=1.0, linestyle=(0, (4, 3)), zorder=3)
-
-
-def face(colour: str) -> dict[str, Any]:
-    return {"facecolor": f"{colour}2E", "edgecolor": colour, "linewidth": 1.5}
-
-
-def _as_list(artists: Any) -> list[Artist]:
-    return list(artists) if isinstance(artists, (list, tuple)) else [artists]
 
 
 def _label(column: Column) -> str:
