@@ -22,6 +22,8 @@ from svo.model import UncertainModel
 Array = NDArray[np.float64]
 Signs = tuple[int, ...]
 
+# Exact sensors (n = 0) read a rounded value: as the observers do, leave room for that.
+ROUNDING = 1e-9
 _OPTIONS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
 
@@ -48,13 +50,14 @@ class FullInformation:
     """All data of a log from a box of first states, for one pattern of the signs of s.
 
     ``signs`` has an entry for each sample and channel, sample by sample: +1 or -1. A channel whose s is
-    known (no x and w in it) has the sign of its s, whatever the entry.
+    known (no x and w in it) has the sign of its s, whatever the entry. Measurement rows are widened by
+    ``rounding`` (1 + |y|).
     """
 
     def __init__(
-        self, model: UncertainModel, log: Log, lower: Array, upper: Array, signs: Signs = (), slack: float = 0.0
+        self, model: UncertainModel, log: Log, lower: Array, upper: Array, signs: Signs = (), rounding: float = ROUNDING
     ) -> None:
-        self.model, self.log = model, log
+        self.model, self.log, self.rounding = model, log, rounding
         self.samples = len(log)
         channels = [self._channels(k) for k in range(self.samples)]
         self.size = model.n_states + model.n_disturbances + len(channels[0])
@@ -67,12 +70,12 @@ class FullInformation:
             self._disturbances(k)
             for q, channel in enumerate(channels[k]):
                 self._channel(k, q, channel, next(pattern, 1))
-            self._equations(k, channels[k], slack)
+            self._equations(k, channels[k])
 
     # -- answers -----------------------------------------------------------------------------------
 
     def margin(self) -> float:
-        """Smallest widening of every sensor's noise that explains the data; negative if there is room to spare."""
+        """Smallest widening of every sensor's noise that explains the data; -1 at least, below zero with room."""
         cost = np.zeros(self.columns)
         cost[-1] = 1.0
         result = self._solve(cost, margin=True)
@@ -102,7 +105,7 @@ class FullInformation:
             b_ub=np.concatenate([high[above], -low[below]]),
             A_eq=matrix[equal],
             b_eq=high[equal],
-            bounds=[(None, None)] * (self.columns - 1) + [(None, None) if margin else (0.0, 0.0)],
+            bounds=[(None, None)] * (self.columns - 1) + [(-1.0, None) if margin else (0.0, 0.0)],
             method="highs",
             options=_OPTIONS,
         )
@@ -157,7 +160,7 @@ class FullInformation:
             coefficients = {j: -side * delta * v for j, v in row.items()} | {self._p(k, q): float(side)}
             self._add(coefficients, side * delta * constant, np.inf)
 
-    def _equations(self, k: int, channels: list[Channel], slack: float) -> None:
+    def _equations(self, k: int, channels: list[Channel]) -> None:
         n, ny = self.model.n_states, self.model.n_outputs
         schedule = self.log.schedule_at(k)
         nominal, noise = self.model.stack(schedule)[0], self.model.bounds(schedule)[2]
@@ -167,17 +170,25 @@ class FullInformation:
             if i < n and k + 1 < self.samples:
                 self._add(row | {self._x(k + 1, i): -1.0}, -constant, -constant)
             elif i >= n and not np.isnan(self.log.y[k, i - n]):
-                y, width = float(self.log.y[k, i - n]), float(noise[i - n]) + slack
+                y = float(self.log.y[k, i - n])
+                width = float(noise[i - n]) + self.rounding * (1 + abs(y))
                 self._add(row, y - width - constant, y + width - constant, soft=1.0)
 
 
-def box(model: UncertainModel, log: Log, lower: Array, upper: Array, signs: list[Signs] | None = None) -> Box:
+def box(
+    model: UncertainModel,
+    log: Log,
+    lower: Array,
+    upper: Array,
+    signs: list[Signs] | None = None,
+    rounding: float = ROUNDING,
+) -> Box:
     """Exact bounds of the newest state of ``log``, the union over the patterns of signs (all, by default)."""
     n = model.n_states
     patterns = all_signs(model, log) if signs is None else signs
     low, high = np.full(n, np.inf), np.full(n, -np.inf)
     for pattern in patterns:
-        program = FullInformation(model, log, lower, upper, pattern)
+        program = FullInformation(model, log, lower, upper, pattern, rounding)
         for j, axis in enumerate(np.eye(n)):
             high[j] = max(high[j], program.support(axis))
             low[j] = min(low[j], -program.support(-axis))
@@ -202,6 +213,19 @@ def all_signs(model: UncertainModel, log: Log) -> list[Signs]:
     if sum(free) > 12:
         raise AssertionError(f"2^{sum(free)} patterns of signs; give the oracle a shorter log, or the signs")
     return list(itertools.product(*[(1, -1) if f else (1,) for f in free]))
+
+
+def signs_along(model: UncertainModel, log: Log) -> Signs:
+    """The pattern of signs of s along the true states, with w at the centre of its bounds."""
+    signs = []
+    for k in range(len(log)):
+        schedule = log.schedule_at(k)
+        lower, upper, _ = model.bounds(schedule)
+        assert log.x is not None
+        known = np.concatenate([log.x[k], log.u[k], [1.0], (lower + upper) / 2])
+        channels = [_rank_one(item, (0.0, 0.0)) for item in model.stack(schedule)[1:]]
+        signs += [1 if channel.f @ known >= 0 else -1 for channel in channels]
+    return tuple(signs)
 
 
 def prefix(log: Log, samples: int) -> Log:
