@@ -30,14 +30,18 @@ app = typer.Typer(
 
 PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered plant; `svo plants` lists them.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]
-NoiseName = Annotated[str | None, typer.Option(help="Noise set: the bounds assumed. [default: the plant's first]")]
+NoiseName = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Noise set: the bounds assumed. [default: the plant's first]")
+]
 
 
 @app.command()
 def plants(as_json: AsJson = False) -> None:
     """List the plants that are registered.
 
-    Example: svo plants
+    \b
+    Example:
+      svo plants
     """
     with _one_line_errors():
         from svo.plant import load_plant, registered_plants
@@ -64,11 +68,13 @@ def study(
     workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
     or 1,
     noise: Annotated[
-        list[str] | None, typer.Option(help="Noise set; may be repeated. [default: the plant's first]")
+        list[str] | None, typer.Option(metavar="NAME", help="Noise set; may be repeated. [default: the plant's first]")
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="Fault, or none for fault-free runs; may be repeated. [default: all and none]"),
+        typer.Option(
+            metavar="NAME", help="Fault, or none for fault-free runs; may be repeated. [default: all and none]"
+        ),
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
@@ -79,7 +85,9 @@ def study(
 
     Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html.
 
-    Example: svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
+    \b
+    Example:
+      svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
     """
     with _one_line_errors():
         _need_study_extra()
@@ -111,16 +119,18 @@ def study(
 def simulate(
     plant: PlantName,
     out: Annotated[Path, typer.Option(metavar="LOG.csv", help="CSV file to write.")],
-    fault: Annotated[str, typer.Option(help="Fault to simulate, or none.")] = "none",
+    fault: Annotated[str, typer.Option(metavar="NAME", help="Fault to simulate, or none.")] = "none",
     profile: Annotated[
-        str | None, typer.Option(help="Shape of the fault in time. [default: the fault's first]")
+        str | None, typer.Option(metavar="NAME", help="Shape of the fault in time. [default: the fault's first]")
     ] = None,
     noise: NoiseName = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; that of a row of runs.parquet gives that very run.")] = 0,
 ) -> None:
     """Simulate one run and write its log, true states included.
 
-    Example: svo simulate eclipse --fault elevator --profile step --noise quiet --seed 0 --out log.csv
+    \b
+    Example:
+      svo simulate eclipse --fault elevator --profile step --noise quiet --seed 0 --out log.csv
     """
     with _one_line_errors():
         from svo.log_file import write_log
@@ -159,7 +169,9 @@ def detect(
 
     An empty or NaN cell of a sensor is a missing measurement. The exit code is 0 also when a fault is found.
 
-    Example: svo detect eclipse log.csv --out findings
+    \b
+    Example:
+      svo detect eclipse log.csv --out findings
     """
     with _one_line_errors():
         from svo.detect import detect as run_detection
@@ -196,7 +208,9 @@ def verify(
 
     The exit code is 1 if any alarm fails.
 
-    Example: svo verify findings/alarms.jsonl --log log.csv
+    \b
+    Example:
+      svo verify findings/alarms.jsonl --log log.csv
     """
     with _one_line_errors():
         from svo.alarms import read_alarms, verify_alarms
@@ -236,12 +250,12 @@ def _one_line_errors() -> Iterator[None]:
     except (ValueError, TypeError, RuntimeError, ImportError) as error:
         _fail(str(error))
     except KeyboardInterrupt:
-        _fail("interrupted; what is done is kept, and --resume goes on with a study")
+        _fail("interrupted; the runs of a study that are done are kept, and --resume goes on", code=130)
 
 
-def _fail(message: str) -> None:
+def _fail(message: str, code: int = 1) -> None:
     typer.echo(f"error: {' '.join(message.split())}", err=True)
-    raise typer.Exit(1)
+    raise typer.Exit(code)
 
 
 def _need_study_extra() -> None:

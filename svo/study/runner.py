@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -88,31 +89,32 @@ def _in_processes(
 ) -> Iterator[int]:
     # Spawned, not forked: a fork would copy the locks of threads that run in this process.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_watch_parent)
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
     waiting = iter(jobs)
     running: set[Future[int]] = set()
     try:
-        with pool:
-            while True:
-                # Few runs are handed out ahead, so that an interruption does not leave a long queue.
-                for job in waiting:
-                    running.add(pool.submit(_run, configuration, folder, job))
-                    if len(running) >= 2 * workers:
-                        break
-                if not running:
-                    return
-                done, running = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    yield future.result()
+        while True:
+            # Few runs are handed out ahead, so that an interruption does not leave a long queue.
+            for job in waiting:
+                running.add(pool.submit(_run, configuration, folder, job))
+                if len(running) >= 2 * workers:
+                    break
+            if not running:
+                return
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
     except BrokenProcessPool as error:
         raise RuntimeError(
             "a worker process died (killed, or out of memory); the runs that are done are kept, resume to go on"
         ) from error
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _watch_parent() -> None:
+def _start_worker() -> None:
+    # An interruption from the keyboard reaches all processes; the parent ends the workers after their runs.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

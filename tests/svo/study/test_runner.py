@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -57,6 +59,35 @@ def test_a_killed_study_goes_on_where_it_was(registered_tank: str, tmp_path: Pat
     assert untimed(resumed.rows()) == untimed(whole.rows())
     assert resumed.alarms.read_bytes() == whole.alarms.read_bytes()
     assert not list(tmp_path.rglob(".run-*"))
+
+
+def test_an_interruption_from_the_keyboard_keeps_what_is_done(registered_tank: str, tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "svo",
+        "study",
+        "tank",
+        "--runs",
+        "400",
+        "--workers",
+        "2",
+        "--out",
+        tmp_path / "out",
+    ]
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    parts = tmp_path / "out" / "runs.parquet"
+    while len(list(parts.glob("run-*"))) < 5:
+        assert process.poll() is None
+        time.sleep(0.002)
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.splitlines()[-1].startswith("error: interrupted;")
+    assert "Traceback" not in errors
+    assert 5 <= len(StudyFolder(tmp_path / "out").rows()) < 1600
 
 
 def test_a_folder_that_is_in_use_is_not_touched(registered_tank: str, tmp_path: Path) -> None:
