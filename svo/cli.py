@@ -28,6 +28,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+PREPARING = "Preparing compiled code (about a minute the first time, then kept)"
+
 PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered plant; `svo plants` lists them.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]
 NoiseName = Annotated[
@@ -100,7 +102,7 @@ def study(
         configuration = StudyConfiguration.for_plant(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or ()
         )
-        _announce("Preparing compiled code (slow the first time, then kept)")
+        _announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
         with _progress("Runs") as update:
             folder = run_study(configuration, out, workers=workers, resume=resume, progress=update)
@@ -184,6 +186,7 @@ def detect(
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
+        _announce(PREPARING)
         with _progress("Samples") as update:
             found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
         if out is not None:
@@ -349,7 +352,7 @@ def _print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
             typer.echo(f"{line[0].upper()}{line[1:]}.")
         typer.echo("")
     if plant.reference:
-        typer.echo(f"Paper: {plant.reference_title}.")
+        typer.echo(f"Paper: {plant.reference_title}; a dash where it says nothing.")
 
 
 def _print_detection(found: Detection) -> None:

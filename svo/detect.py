@@ -119,6 +119,7 @@ def detect(
         Called with (samples done, samples in all) after each sample.
     """
     bank = plant.bank(noise)
+    bank.warm_up()  # no sample waits for a compiler
     recorder = Recorder(bank.names, len(log))
     for verdict in verdicts(bank, log, plant.scheduler()):
         recorder.add(verdict)

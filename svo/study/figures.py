@@ -60,7 +60,7 @@ def _pictures(
             continue
         text = "Bars: mean; lines: 5–95 % of the runs; a count where not every run got there."
         if plant.reference:
-            text += f" Diamonds: {plant.reference_title}; a triangle points down from an upper bound."
+            text += " Diamonds: the paper's figures; triangles point down from its upper bounds."
         title = f"Times to detect and to isolate, {noise} noise"
         yield _save(folder / f"delays_{noise}.png", _delays(plant, chosen), title, text)
         title = f"Models alive over time, {noise} noise"

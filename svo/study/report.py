@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from svo.plant import Plant
+from svo.plant import HEALTHY, Plant
 from svo.study import tables
 from svo.study.figures import Picture
 from svo.study.summary import ConditionSummary
@@ -60,13 +60,15 @@ def write_report(
         "<h2>What came out</h2>",
         _findings(summaries),
         *(_html_table(tables.delay_table(plant, group)) for group in _by_noise(summaries)),
-        f'<p class="soft">Paper: {escape(plant.reference_title)}.</p>' if plant.reference else "",
+        f'<p class="soft">Paper: {escape(plant.reference_title)}; a dash where it says nothing.</p>'
+        if plant.reference
+        else "",
         "<h2>Pictures</h2>",
         *(_figure(picture) for picture in pictures),
         "<h2>What is counted</h2>",
         "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in _GLOSSARY.items()) + "</dl>",
         "<h2>How to make it again</h2>",
-        f"<p><code>{escape(_command(configuration))}</code></p>",
+        f"<p><code>{escape(_command(plant, configuration))}</code></p>",
         "<p>The table of runs is in <code>runs.parquet</code>, the statistics in <code>summary.csv</code>, every alarm "
         "with its certificate in <code>alarms.jsonl</code> (<code>svo verify</code> checks them). "
         "<code>svo simulate</code> with a run's seed makes that run's log.</p>",
@@ -155,8 +157,9 @@ def _text(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _command(configuration: Mapping[str, Any]) -> str:
-    noise = " ".join(f"--noise {name}" for name in configuration["noise"])
-    faults = " ".join(f"--fault {name}" for name in configuration["faults"])
-    numbers = f"--runs {configuration['runs']} --seed {configuration['seed']}"
-    return f"svo study {configuration['plant']} {numbers} {noise} {faults} --out DIR"
+def _command(plant: Plant, configuration: Mapping[str, Any]) -> str:
+    options = [f"--runs {configuration['runs']}", f"--seed {configuration['seed']}"]
+    options += [f"--noise {name}" for name in configuration["noise"]]
+    if list(configuration["faults"]) != [HEALTHY, *plant.faults]:
+        options += [f"--fault {name}" for name in configuration["faults"]]
+    return f"svo study {configuration['plant']} {' '.join(options)} --out DIR"
