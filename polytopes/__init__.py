@@ -2,8 +2,8 @@
 
 from polytopes.certificate import Certificate
 from polytopes.emptiness import Emptiness
-from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
-from polytopes.hpolytope import HPolytope
+from polytopes.errors import EmptySetError, ProjectionLimitError, UnboundedError, UndecidedError
+from polytopes.hpolytope import HPolytope, convex_hull
 from polytopes.linear_program import warm_up
 from polytopes.support import Ball, SupportResult
 
@@ -13,8 +13,10 @@ __all__ = [
     "Emptiness",
     "EmptySetError",
     "HPolytope",
+    "ProjectionLimitError",
     "SupportResult",
     "UnboundedError",
     "UndecidedError",
+    "convex_hull",
     "warm_up",
 ]

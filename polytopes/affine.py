@@ -4,6 +4,7 @@ The rank and the consistency of equalities are decided in rationals, so an equal
 coefficients are, and no tolerance takes a dependent row for an independent one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +12,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
-from polytopes.exact import ZERO, Multipliers, rational, rational_matrix, rational_vector, to_floats
+from polytopes.exact import ZERO, Multipliers, rational, rational_matrix, rational_vector, row_to_floats, to_floats
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ class AffineSet:
     Attributes
     ----------
     pivots, free : list of int
-        Coordinates that the equalities determine, and the others.
+        Coordinates that the equalities determine, and the others in increasing order.
     solved : fmpq_mat
         Reduced rows ``x_pivot = solved[:, -1] - solved[:, :-1] x_free``, exact.
     contradiction : dict or None
@@ -82,11 +83,20 @@ class AffineSet:
         magnitude = np.abs(A) @ np.abs(self.basis)
         cancelled = (np.abs(reduced) < 1e-3 * magnitude).any(axis=1) if self.free else np.ones(len(b), bool)
         for i in np.flatnonzero(cancelled).tolist():
-            row, constant = self._restrict_exactly(A[i], b[i])
+            row, constant = self._restricted(A[i], b[i])
             reduced[i], rhs[i] = to_floats(row), to_floats([constant])[0]
         return reduced, rhs
 
-    def _restrict_exactly(self, row: Floats, rhs: float) -> tuple[list[fmpq], fmpq]:
+    def restrict_exactly(self, A: Floats, b: Floats) -> tuple[Floats, Floats]:
+        """The same in rationals throughout, each row up to a positive factor (see `row_to_floats`)."""
+        if not self.pivots:
+            return A, b
+        exact = [self._restricted(row, value) for row, value in zip(A, b, strict=True)]
+        table = [row_to_floats([*coefficients, constant]) for coefficients, constant in exact]
+        both = np.array(table).reshape(len(b), len(self.free) + 1)
+        return both[:, :-1], both[:, -1]
+
+    def _restricted(self, row: Floats, rhs: float) -> tuple[list[fmpq], fmpq]:
         exact = rational_vector(row)
         coefficients, constant = [exact[j] for j in self.free], rational(rhs)
         for k, j in enumerate(self.pivots):
@@ -97,40 +107,45 @@ class AffineSet:
         return coefficients, constant
 
 
-def affine_set(C: Floats, d: Floats) -> AffineSet:
+def affine_set(C: Floats, d: Floats, first: Sequence[int] = ()) -> AffineSet:
     """Solve ``C x = d`` exactly.
 
     Parameters
     ----------
     C, d : arrays (q, n) and (q,)
+    first : sequence of int
+        Coordinates to solve for before any other.  The solved row of another coordinate has no entry in them.
     """
     q, n = C.shape
     if q == 0:
         return AffineSet(n, [], list(range(n)), fmpq_mat(0, n + 1), None)
-    order = _pivot_order(C)
+    order = _pivot_order(C, list(first))
     table = rational_matrix(np.hstack([C[:, order], d[:, None]]))
     reduced, rank = table.rref()
     leading = [next(j for j in range(n + 1) if reduced[k, j] != 0) for k in range(rank)]
     if leading and leading[-1] == n:
         return AffineSet(n, [], list(range(n)), fmpq_mat(0, n + 1), _contradiction(C, d))
-    columns = [j for j in range(n) if j not in leading]
+    columns = sorted((j for j in range(n) if j not in leading), key=lambda j: order[j])
     pivots, free = [int(order[j]) for j in leading], [int(order[j]) for j in columns]
     entries = [reduced[k, j] for k in range(rank) for j in [*columns, n]]
     return AffineSet(n, pivots, free, fmpq_mat(rank, len(columns) + 1, entries), None)
 
 
-def _pivot_order(C: Floats) -> NDArray[np.int64]:
-    """Columns of C, those that make good pivots first (complete pivoting in floats)."""
+def _pivot_order(C: Floats, first: list[int]) -> NDArray[np.int64]:
+    """Columns of C, `first` and then those that make good pivots (complete pivoting in floats) in front."""
     work = C / np.where(np.abs(C).max(axis=1) > 0, np.abs(C).max(axis=1), 1.0)[:, None]
-    chosen: list[int] = []
-    for _ in range(min(work.shape)):
-        i, j = np.unravel_index(np.argmax(np.abs(work)), work.shape)
-        if work[i, j] == 0:
-            break
-        chosen.append(int(j))
-        work = work - np.outer(work[:, j] / work[i, j], work[i])
-        work[i], work[:, j] = 0.0, 0.0
-    return np.array(chosen + [j for j in range(C.shape[1]) if j not in chosen], dtype=np.int64)
+    others = [j for j in range(C.shape[1]) if j not in first]
+    order: list[int] = []
+    for group in (first, others):
+        chosen: list[int] = []
+        while group and np.abs(work[:, group]).max() > 0.0:
+            i, k = np.unravel_index(np.argmax(np.abs(work[:, group])), (C.shape[0], len(group)))
+            j = group[k]
+            chosen.append(j)
+            work = work - np.outer(work[:, j] / work[i, j], work[i])
+            work[i], work[:, j] = 0.0, 0.0
+        order += chosen + [j for j in group if j not in chosen]
+    return np.array(order, dtype=np.int64)
 
 
 def _contradiction(C: Floats, d: Floats) -> Multipliers:

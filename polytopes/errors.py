@@ -18,6 +18,10 @@ class EmptySetError(ValueError):
     """An operation that needs a point was given the empty set."""
 
 
+class ProjectionLimitError(RuntimeError):
+    """Fourier-Motzkin elimination would form more rows than it was allowed to."""
+
+
 def as_array(name: str, value: ArrayLike, ndim: int, *, finite: bool = True) -> NDArray[np.float64]:
     """`value` as a new float64 array of `ndim` dimensions.
 

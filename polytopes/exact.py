@@ -8,12 +8,13 @@ window are checked by the same lines.
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, fmpz
 from numpy.typing import NDArray
 
 Multipliers = dict[int, fmpq]  # row index -> multiplier; rows that are absent have multiplier zero
 
 ZERO = fmpq(0)
+_INTEGERS = 2**53  # integers up to here are floats
 
 
 def rational(value: float) -> fmpq:
@@ -35,6 +36,23 @@ def rational_matrix(matrix: NDArray[np.float64]) -> fmpq_mat:
 def to_floats(values: Iterable[fmpq]) -> NDArray[np.float64]:
     """Rationals rounded to the nearest floats."""
     return np.array([int(v.p) / int(v.q) for v in values], dtype=np.float64)
+
+
+def row_to_floats(values: Sequence[fmpq]) -> NDArray[np.float64]:
+    """A row as floats, up to a positive factor: exact where it is a multiple of integers below 2^53.
+
+    ``x - y / 3 <= 1`` becomes ``3 x - y <= 3``, whose floats are still parallel to what they were.
+    """
+    largest = max((abs(v) for v in values), default=ZERO)
+    if largest == 0:
+        return np.zeros(len(values))
+    denominator, divisor = fmpz(1), fmpz(0)
+    for v in values:
+        denominator = denominator.lcm(v.q)
+    for v in values:
+        divisor = divisor.gcd((v * denominator).p)
+    factor = fmpq(denominator, divisor)
+    return to_floats(v * factor if largest * factor <= _INTEGERS else v / largest for v in values)
 
 
 def combine(rows: NDArray[np.float64], rhs: NDArray[np.float64], multipliers: Multipliers) -> tuple[list[fmpq], fmpq]:

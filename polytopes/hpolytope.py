@@ -1,20 +1,22 @@
 """`HPolytope`: the set ``{x : A x <= b, C x = d}`` as an immutable value; a thin face over the operations."""
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes import containment, plotting
+from polytopes import combinations, containment, plotting, projection, reduction, sampling
 from polytopes import support as support_functions
 from polytopes.affine_hull import affine_dim
 from polytopes.emptiness import Emptiness
 from polytopes.errors import as_array, as_matrix, as_vector
-from polytopes.hull import rows_of_points, vertices
+from polytopes.hull import rows_of_points
 from polytopes.redundancy import minimal_rows
 from polytopes.rows import Rows
 from polytopes.support import Ball, SupportResult
+from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
 
@@ -82,6 +84,17 @@ class HPolytope(Rows):
     def whole_space(cls, n: int) -> Self:
         """R^n: no rows."""
         return cls(np.empty((0, n)), np.empty(0))
+
+    @classmethod
+    def simplex(cls, n: int) -> Self:
+        """``{x >= 0, x_1 + ... + x_n <= 1}``."""
+        return cls(np.vstack([-np.eye(n), np.ones((1, n))]), np.append(np.zeros(n), 1.0))
+
+    @classmethod
+    def cross_polytope(cls, n: int) -> Self:
+        """``{|x_1| + ... + |x_n| <= 1}``, 2^n rows."""
+        signs = np.array(list(itertools.product([1.0, -1.0], repeat=n)))
+        return cls(signs, np.ones(len(signs)))
 
     def __repr__(self) -> str:
         equalities = f", {self.d.size} equalities" if self.d.size else ""
@@ -182,6 +195,20 @@ class HPolytope(Rows):
         """
         return vertices(self)
 
+    def volume(self) -> float:
+        """n-dimensional volume: 0 for flat and empty sets, inf for unbounded full-dimensional ones."""
+        return sampling.volume(self)
+
+    def random_points(self, count: int, rng: np.random.Generator) -> Floats:
+        """Points (count, n) of a bounded set, close to uniform (hit-and-run from the centre of a largest ball).
+
+        Raises
+        ------
+        EmptySetError, UnboundedError
+            If there are no points, or no uniform distribution on them.
+        """
+        return sampling.random_points(self, count, rng)
+
     # other sets from this one
 
     def remove_redundancy(self) -> Self:
@@ -219,6 +246,81 @@ class HPolytope(Rows):
         shift = np.zeros(self.dim) if t is None else as_vector("t", t, self.dim)
         return type(self)(self.A @ matrix, self.b - self.A @ shift, self.C @ matrix, self.d - self.C @ shift)
 
+    def affine_map(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
+        """Image ``{M x + t : x in P}``.
+
+        Parameters
+        ----------
+        M : array_like (p, n)
+            Any matrix; a singular or flat one gives explicit equalities.  Square maps of condition number below 1e8
+            are inverted, others are projections from n + p coordinates (see `project`).
+        t : array_like (p,), optional
+            Zero if absent.
+        """
+        matrix = as_matrix("M", M, self.dim)
+        shift = np.zeros(len(matrix)) if t is None else as_vector("t", t, len(matrix))
+        return type(self)(*combinations.affine_image(self, matrix, shift))
+
+    def minkowski_sum(self, Q: Rows) -> Self:
+        """``{x + y : x in P, y in Q}``, exact: a projection from 2 n coordinates (see `project`)."""
+        return type(self)(*combinations.minkowski_sum(self, _same_space(self, Q)))
+
+    def pontryagin_difference(self, Q: Rows) -> Self:
+        """``{x : x + y in P for all y in Q}``: one linear program per row; the whole space if Q is empty.
+
+        An equality of P survives only if it is constant over Q, to 1e-12 of its size.
+        """
+        return type(self)(*combinations.pontryagin_difference(self, _same_space(self, Q)))
+
+    def project(
+        self, keep: Sequence[int], method: str = "auto", max_rows: int = 20_000, outer: bool = False
+    ) -> Self:
+        """Projection ``{x_keep : x in P}``, exact, on the coordinates `keep` in their order.
+
+        Equalities are solved for the other coordinates first, in rationals.
+
+        Parameters
+        ----------
+        keep : sequence of int
+            Different coordinates, at least one.
+        method : {"auto", "fourier-motzkin", "convex-hull", "vertices"}
+            "fourier-motzkin" works for every set and is fastest on sparse rows; "convex-hull" (a bounded shadow) costs
+            by the facets of the result; "vertices" (a bounded set) by the vertices of this one.  "auto" eliminates
+            while a step forms at most 600 rows, then takes the convex hull if the shadow is bounded.
+        max_rows : int
+            Limit on the rows that one step of Fourier-Motzkin may form.
+        outer : bool
+            At that limit return a superset (supports along the normals at hand) instead of raising.
+
+        Raises
+        ------
+        ProjectionLimitError
+            At the limit, without `outer`; the message holds the numbers.
+        UnboundedError
+            If the method needs a bounded set.
+        """
+        kept = [int(j) for j in keep]
+        if not kept or len(set(kept)) != len(kept) or not all(0 <= j < self.dim for j in kept):
+            raise ValueError(f"keep is {list(keep)}; expected different coordinates below {self.dim}, at least one.")
+        if method not in projection.METHODS:
+            raise ValueError(f"method is {method!r}; expected one of {', '.join(projection.METHODS)}.")
+        return type(self)(*projection.project(self, kept, method, max_rows, outer))
+
+    def outer_reduce(self, max_facets: int) -> Self:
+        """A superset with at most `max_facets` inequalities, bounded if this set is.
+
+        Greedy: of the minimal rows, the one goes whose removal lets its own support grow least.
+
+        Parameters
+        ----------
+        max_facets : int
+            At least twice the dimension.
+        """
+        if max_facets < 2 * self.dim:
+            raise ValueError(f"max_facets is {max_facets}; expected at least {2 * self.dim}, twice the dimension.")
+        minimal = self.remove_redundancy()
+        return minimal.with_rows(*reduction.reduced_rows(minimal, max_facets))
+
     def outer_template(self, directions: ArrayLike) -> Self:
         """Smallest set ``{x : T x <= h}`` with the given normals (k, n) that contains this one.
 
@@ -245,6 +347,24 @@ class HPolytope(Rows):
         if len(pair) != 2 or len(set(pair)) != 2 or not all(0 <= j < self.dim for j in pair):
             raise ValueError(f"dims is {tuple(dims)}; expected two different coordinates below {self.dim}.")
         return plotting.plot(self, ax, (pair[0], pair[1]), style)
+
+
+def convex_hull(sets: Sequence[HPolytope]) -> HPolytope:
+    """Closed convex hull of a union; empty sets add nothing.
+
+    Bounded sets: the hull of their vertices.  Otherwise a projection of the lifted form of Balas (1985), in as many
+    coordinates as all sets together.
+
+    Parameters
+    ----------
+    sets : sequence of HPolytope
+        At least one, all of one dimension.
+    """
+    if not sets:
+        raise ValueError("sets is empty; expected at least one HPolytope.")
+    for P in sets:
+        _same_space(sets[0], P)
+    return HPolytope(*combinations.hull_of_union(sets))
 
 
 def _tolerance(tol: float) -> float:

@@ -1,108 +1,15 @@
-"""Between vertices and rows: convex hulls of points, and the vertices of bounded sets.
-
-Qhull does the combinatorics, on coordinates centred in the set and scaled to about unit size along its own axes; flat
-sets are handled in their subspace.  Points are never rounded on the way.
-"""
+"""Convex hulls: of points, and of a set known only by its support points."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes.affine_hull import explicit
-from polytopes.errors import UnboundedError
+from polytopes.frame import Oracle, unit_frame
 from polytopes.redundancy import irredundant
 from polytopes.rows import Rows
-from polytopes.support import is_bounded, known_nonempty
 
 Floats = NDArray[np.float64]
 _FLAT = 1e-12  # relative width below which points are taken to lie in a subspace
-_SAME = 1e-9  # relative distance below which two computed vertices are one
-
-
-def vertices(P: Rows) -> Floats:
-    """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
-
-    Vertices closer than 1e-9 of the size of the set (measured in scaled coordinates) are merged.
-
-    Raises
-    ------
-    UnboundedError
-        If P is unbounded.
-    """
-    if not known_nonempty(P):
-        return np.empty((0, P.dim))
-    if not is_bounded(P):
-        raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
-    flat = explicit(P)
-    program = flat.program
-    free = program.flat.free
-    if not free:
-        return program.flat.point[None].copy()
-    kept = irredundant(program)
-    rows, rhs = np.ascontiguousarray(program.AT[:, kept].T), program.rhs[kept]
-    z = _interval_ends(rows, rhs) if len(free) == 1 else _vertices_in_frame(rows, rhs)
-    lifted: Floats = program.flat.lift(z)
-    return lifted
-
-
-def _interval_ends(rows: Floats, rhs: Floats) -> Floats:
-    ends = rhs / rows[:, 0]
-    return np.sort(ends)[:, None]
-
-
-def _vertices_in_frame(rows: Floats, rhs: Floats) -> Floats:
-    """Vertices of a bounded, full-dimensional set, by the dual hull in coordinates where it is about a unit ball."""
-    from scipy.spatial import HalfspaceIntersection
-
-    centre, frame = _frame(rows, rhs)
-    scaled, room = rows @ frame, rhs - rows @ centre
-    lengths = np.linalg.norm(scaled, axis=1)
-    scaled, room = scaled / lengths[:, None], room / lengths
-    inner = Rows(scaled, room).program.interior.point
-    hull = HalfspaceIntersection(np.hstack([scaled, -room[:, None]]), inner)
-    corners = zip(hull.dual_facets, hull.intersections, strict=True)
-    points = _merged(np.array([_corner(scaled, room, active, guess) for active, guess in corners]))
-    return centre + points @ frame.T
-
-
-def _corner(rows: Floats, rhs: Floats, active: list[int], guess: Floats) -> Floats:
-    """The vertex recomputed from its active rows."""
-    correction = np.linalg.lstsq(rows[active], rhs[active] - rows[active] @ guess, rcond=None)[0]
-    corrected: Floats = guess + correction
-    return corrected
-
-
-def _frame(rows: Floats, rhs: Floats) -> tuple[Floats, Floats]:
-    """A centre and axes (columns) in which the set has widths of about one.
-
-    Widths along the current axes scale them; where the support points then lie near a subspace (a thin, skew set), the
-    axes turn to the principal ones and the widths are taken again.
-    """
-    program = Rows(rows, rhs).program
-    centre, frame = program.interior.point, np.eye(rows.shape[1])
-    for _ in range(3):
-        axes = np.linalg.inv(frame)
-        values = program.maximise(np.vstack([axes, -axes])).values
-        frame = frame * (values[: len(axes)] + values[len(axes) :])
-        axes = np.linalg.inv(frame)
-        points = (program.maximise(np.vstack([axes, -axes])).points - centre) @ axes.T
-        _, sizes, principal = np.linalg.svd(points - points.mean(axis=0))
-        if sizes[-1] > 0.05:
-            break
-        turned = frame @ principal.T
-        axes = np.linalg.inv(turned)
-        values = program.maximise(np.vstack([axes, -axes])).values
-        frame = turned * (values[: len(axes)] + values[len(axes) :])
-    return centre, frame
-
-
-def _merged(points: Floats) -> Floats:
-    """Points without near-duplicates, in lexicographic order of their first occurrence."""
-    reach = _SAME * max(1.0, float(np.abs(points).max()))
-    chosen: list[Floats] = []
-    for point in points[np.lexsort(points.T[::-1])]:
-        if not chosen or np.abs(np.array(chosen) - point).max(axis=1).min() > reach:
-            chosen.append(point)
-    return np.array(chosen)
+_REACHED = 1e-11  # a facet is final if no point of the set lies this far beyond it (widths are about one)
 
 
 def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -121,18 +28,82 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     d = C @ centre
     if rank == 0:
         return np.empty((0, n)), np.empty(0), np.eye(n), V[0].copy()
-    normals = _facet_normals(offsets @ axes[:rank].T / sizes[:rank]) / sizes[:rank] @ axes[:rank]
+    normals = _facets(offsets @ axes[:rank].T / sizes[:rank])[:, :-1] / sizes[:rank] @ axes[:rank]
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
     hull = Rows(normals, (V @ normals.T).max(axis=0), C, d)
-    kept = hull.program.kept[irredundant(hull.program)]
+    kept = hull.program.kept[irredundant(hull.program, centre)]
     return hull.A[kept], hull.b[kept], C, d
 
 
-def _facet_normals(points: Floats) -> Floats:
-    """Outward normals of the hull of full-dimensional points."""
+def _facets(points: Floats) -> Floats:
+    """Distinct facets of the hull of full-dimensional points: outward unit normals and minus the offsets."""
     from scipy.spatial import ConvexHull
 
     if points.shape[1] == 1:
-        return np.array([[1.0], [-1.0]])
-    normals: Floats = ConvexHull(points).equations[:, :-1]
-    return normals
+        return np.array([[1.0, -points.max()], [-1.0, points.min()]])
+    return np.unique(ConvexHull(points).equations, axis=0)
+
+
+def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
+    """Minimal rows of a bounded, full-dimensional set from its support points.
+
+    The hull of a few support points is refined: a support point along the normal of every facet either confirms the
+    facet or lies beyond it and is added.  Every row returned is a supporting half-space of the set, so the result
+    contains it.
+
+    Parameters
+    ----------
+    oracle : callable
+        Directions (k, n) to a maximiser for each, (k, n).
+    inner : array (n,)
+        A point strictly inside.
+
+    Returns
+    -------
+    A, b : arrays (m, n) and (m,)
+    """
+    n = inner.size
+    if n == 1:
+        ends = oracle(np.array([[1.0], [-1.0]]))[:, 0]
+        return np.array([[1.0], [-1.0]]), ends * [1.0, -1.0]
+    frame = unit_frame(oracle, inner)
+    axes = np.linalg.inv(frame)
+
+    def scaled_oracle(directions: Floats) -> Floats:
+        points: Floats = (oracle(directions @ axes) - inner) @ axes.T
+        return points
+
+    normals = _refined_normals(scaled_oracle, n) @ axes
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    hull = Rows(normals, (normals * oracle(normals)).sum(axis=1))
+    kept = hull.program.kept[irredundant(hull.program, inner)]
+    return hull.A[kept], hull.b[kept]
+
+
+def _refined_normals(oracle: Oracle, n: int) -> Floats:
+    """Normals of the facets of a set of widths about one.
+
+    Each round starts Qhull afresh: its incremental mode ends the whole process on a topology error.
+    """
+    points = _spanning_points(oracle, n)
+    final: set[bytes] = set()
+    while True:
+        facets = _facets(points)
+        fresh = facets[[facet.tobytes() not in final for facet in facets]]
+        found = oracle(fresh[:, :-1])
+        beyond = (found * fresh[:, :-1]).sum(axis=1) + fresh[:, -1] > _REACHED
+        if not beyond.any():
+            return facets[:, :-1]
+        final.update(facet.tobytes() for facet in fresh[~beyond])
+        points = np.vstack([points, np.unique(found[beyond], axis=0)])
+
+
+def _spanning_points(oracle: Oracle, n: int) -> Floats:
+    """Support points that do not lie near a hyperplane."""
+    points = oracle(np.vstack([np.eye(n), -np.eye(n)]))
+    for _ in range(n):
+        _, sizes, principal = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)
+        if sizes.size == n and sizes[-1] > _REACHED**0.5:
+            break
+        points = np.vstack([points, oracle(np.vstack([principal[-1], -principal[-1]]))])
+    return points

@@ -1,9 +1,10 @@
 """Linear programs over one set of rows: prepared once, solved by the kernel, by HiGHS, or in rationals.
 
 `Program` holds ``{x : A x <= b, C x = d}`` ready for solving: equalities eliminated (exactly), constant rows set aside,
-rows scaled by powers of two.  Small programs go to the compiled kernel, large ones to HiGHS.  An answer that is not
-clean (an iteration limit, a doubtful ray, optimality conditions violated) passes to HiGHS, then to the rational
-simplex; what none of them settles is reported as undecided, never guessed.
+rows scaled by powers of two.  Small programs go to the compiled kernel, large ones to HiGHS.  Where the kernel gives no
+clean answer (an iteration limit, a ray or a pivot near rounding), the rational simplex decides if the program is small
+enough, else HiGHS, whose optimum must satisfy the optimality conditions.  What none of them settles is reported as
+undecided, never guessed.
 """
 
 import logging
@@ -164,7 +165,7 @@ class Program:
         directions : array (k, n)
         """
         k, free = directions.shape[0], self.AT.shape[0]
-        reduced = np.ascontiguousarray(directions @ self.flat.basis) if self.flat.pivots else directions
+        reduced = np.ascontiguousarray(self.flat.restrict(directions, np.zeros(k))[0])
         points, weights = np.zeros((k, free)), np.zeros((k, self.kept.size))
         status = [OPTIMAL] * k if free == 0 else [UNDECIDED] * k
         if free and self._small:
@@ -187,12 +188,8 @@ class Program:
         return [_NAMES.get(code, UNDECIDED) for code in status.tolist()]
 
     def _maximise_carefully(self, direction: Floats, reduced: Floats) -> tuple[str, float, Floats, Floats]:
-        """HiGHS, accepted if the optimality conditions hold; else the rational simplex."""
-        answer = self._highs.maximise(reduced)
-        if answer.status == "optimal" and self._optimal(reduced, answer.point, answer.multipliers):
-            point = self.flat.lift(answer.point)
-            return OPTIMAL, float(direction @ point), point, self._unscaled(answer.multipliers)
-        nowhere = np.full(self.flat.dim, np.nan)
+        """The rational simplex if it is affordable, else HiGHS, accepted if the optimality conditions hold."""
+        nowhere, nothing = np.full(self.flat.dim, np.nan), np.zeros(self.b.size)
         if affordable(*self.A.shape):
             start = exact_feasibility(self.A, self.b, self.flat, self.interior.point)
             if start.status == "reached":
@@ -200,10 +197,14 @@ class Program:
                 if outcome.status == "optimal":
                     return OPTIMAL, *rounded(outcome, self.b.size)
                 if outcome.status == "unbounded":
-                    return UNBOUNDED, np.inf, nowhere, np.zeros(self.b.size)
-        elif answer.status == "unbounded":
-            return UNBOUNDED, np.inf, nowhere, np.zeros(self.b.size)
-        return UNDECIDED, np.nan, nowhere, np.zeros(self.b.size)
+                    return UNBOUNDED, np.inf, nowhere, nothing
+        answer = self._highs.maximise(reduced)
+        if answer.status == "optimal" and self._optimal(reduced, answer.point, answer.multipliers):
+            point = self.flat.lift(answer.point)
+            return OPTIMAL, float(direction @ point), point, self._unscaled(answer.multipliers)
+        if answer.status == "unbounded":
+            return UNBOUNDED, np.inf, nowhere, nothing
+        return UNDECIDED, np.nan, nowhere, nothing
 
     def _optimal(self, c: Floats, z: Floats, y: Floats) -> bool:
         """Primal and dual feasibility and equal objectives, to a relative 1e-9."""

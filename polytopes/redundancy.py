@@ -28,7 +28,7 @@ def minimal_rows(P: Rows) -> tuple[Floats, Floats, Floats, Floats]:
         return np.zeros((1, n)), np.array([-1.0]), np.empty((0, n)), np.empty(0)
     flat = explicit(P)
     program = flat.program
-    rows = program.kept[irredundant(program)] if program.flat.free else np.empty(0, np.int64)
+    rows = program.kept[irredundant(program, inner_point(program))]
     independent = independent_rows(flat.C)
     return flat.A[rows], flat.b[rows], flat.C[independent], flat.d[independent]
 
@@ -41,11 +41,25 @@ def independent_rows(C: Floats) -> list[int]:
     return [next(j for j in range(C.shape[0]) if reduced[k, j] != 0) for k in range(rank)]
 
 
-def irredundant(program: Program) -> Indices:
-    """Positions (among the kept rows) of a minimal set of rows of a full-dimensional program."""
+def inner_point(program: Program) -> Floats:
+    """Free coordinates of the centre of a largest ball."""
+    return program.interior.point[program.flat.free]
+
+
+def irredundant(program: Program, inner: Floats) -> Indices:
+    """Positions (among the kept rows) of a minimal set of rows of a full-dimensional program.
+
+    Parameters
+    ----------
+    program : Program
+    inner : array (free,)
+        A point strictly inside, in the free coordinates.
+    """
+    if program.AT.size == 0:
+        return np.empty(0, np.int64)
     distinct = _distinct(program)
     AT, b = np.ascontiguousarray(program.AT[:, distinct]), program.rhs[distinct]
-    start = np.ascontiguousarray(program.interior.point[program.flat.free])
+    start = np.ascontiguousarray(inner)
     warm_up()
     if b.size >= _CLARKSON_FROM:
         keep, doubtful = kernel.irredundant_clarkson(AT, b, start, _TOLERANCE * program.size)

@@ -26,7 +26,8 @@ OPTIMAL, STOPPED, UNBOUNDED, AMBIGUOUS, LIMIT = 0, 1, 2, 3, 4
 
 _PIVOT = 1e-9  # rates below are masked before the ratio test
 _RAY = 1e-13  # no rate above this: the edge is a ray
-_PRICE = 1e-12  # relative reduced cost that still counts as zero
+_PRICE = 1e-14  # relative reduced cost that still counts as zero
+_CERTAIN = 1e-11  # relative reduced cost below which a ray may be an effect of rounding
 _HARRIS = 1e-11  # ratio-test tolerance, relative to the size of b
 _REFACTOR = 40  # pivots between two fresh inverses
 _EPS = 2.220446049250313e-16
@@ -209,7 +210,8 @@ def _ascend(
             largest = 0.0
             for i in range(m):
                 largest = max(largest, rate[i])
-            return UNBOUNDED if largest <= _RAY else AMBIGUOUS
+            certain = abs(y[slot]) > _CERTAIN * size * np.sqrt(length)
+            return UNBOUNDED if largest <= _RAY and certain else AMBIGUOUS
         step = max(s[row], 0.0) / rate[row]
         degenerate = degenerate + 1 if step <= 1e-13 * scale else 0
         for j in range(d):

@@ -24,7 +24,7 @@ CATALOGUE = {
     "duplicate rows": HPolytope(np.vstack([SQUARE[0]] * 2), np.ones(8)),
     "scaled rows": HPolytope(SQUARE[0] * [[1e-6], [1e6], [3.0], [0.1]], [1e-6, 1e6, 3.0, 0.1]),
     "zero rows": HPolytope(np.vstack([SQUARE[0], np.zeros((2, 2))]), np.append(SQUARE[1], [0.0, 2.0])),
-    "thin": HPolytope.box([0.0, 0.0], [1.0, 1e-9]),
+    "thin": HPolytope.box([0.0, 0.0], [1.0, 2.0**-30]),
     "interval": HPolytope([[2.0], [-1.0], [1.0]], [1.0, 1.0, 5.0]),
     "half-line": HPolytope([[-1.0]], [0.0]),
     "one-dimensional point": HPolytope([[1.0], [-1.0]], [0.5, -0.5]),

@@ -3,8 +3,8 @@
 import json
 
 import numpy as np
-import ppl
 import pytest
+from exact_sets import polyhedron
 from flint import fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,17 +18,7 @@ from polytopes.highs import HighsOutcome, HighsProgram
 
 def exactly_empty(P: HPolytope) -> bool:
     """The Parma library's answer, on the floats as rationals."""
-    system = ppl.Constraint_System()
-    x = [ppl.Variable(j) for j in range(P.dim)]
-    system.insert(0 * x[-1] <= 0)
-    for rows, rhs, equal in ((P.A, P.b, False), (P.C, P.d, True)):
-        for row, value in zip(rows, rhs, strict=True):
-            ratios = [v.as_integer_ratio() for v in [*row.tolist(), float(value)]]
-            common = max(q for _, q in ratios)  # denominators are powers of two
-            *coefficients, constant = [p * (common // q) for p, q in ratios]
-            form = sum((c * v for c, v in zip(coefficients, x, strict=True)), 0 * x[0])
-            system.insert(form == constant if equal else form <= constant)
-    return bool(ppl.C_Polyhedron(system).is_empty())
+    return bool(polyhedron(P).is_empty())
 
 
 @pytest.mark.parametrize("kind", KINDS)

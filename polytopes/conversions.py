@@ -1,0 +1,82 @@
+"""To and from the forms of other libraries; an equality becomes two rows where they know only inequalities."""
+
+import importlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes.errors import as_array
+from polytopes.hpolytope import HPolytope
+
+Floats = NDArray[np.float64]
+
+
+def to_halfspaces(P: HPolytope) -> Floats:
+    """Rows ``[A, -b]`` (m + 2 q, n + 1) as in `scipy.spatial.HalfspaceIntersection`: ``A x - b <= 0``."""
+    A, b = np.vstack([P.A, P.C, -P.C]), np.concatenate([P.b, P.d, -P.d])
+    return np.hstack([A, -b[:, None]])
+
+
+def from_halfspaces(halfspaces: ArrayLike) -> HPolytope:
+    """Set of rows ``[A, -b]``, the inverse of `to_halfspaces`; also takes `ConvexHull.equations`."""
+    rows = as_array("halfspaces", halfspaces, 2)
+    return HPolytope(rows[:, :-1], -rows[:, -1])
+
+
+def to_cdd(P: HPolytope) -> Any:
+    """An H-representation ``b - A x >= 0`` as a float matrix of pycddlib, equalities in its linearity set.
+
+    Raises
+    ------
+    ImportError
+        If pycddlib is not installed.
+    """
+    rows = np.vstack([np.hstack([P.b[:, None], -P.A]), np.hstack([P.d[:, None], -P.C])])
+    matrix = _cdd().matrix_from_array(rows.tolist(), rep_type=_cdd().RepType.INEQUALITY)
+    matrix.lin_set = set(range(P.b.size, len(rows)))
+    return matrix
+
+
+def from_cdd(matrix: Any) -> HPolytope:
+    """Set of an H-representation of pycddlib.
+
+    Raises
+    ------
+    ValueError
+        If the matrix holds generators instead.
+    """
+    if matrix.rep_type != _cdd().RepType.INEQUALITY:
+        raise ValueError("matrix is not an H-representation; convert it with cdd.copy_inequalities first.")
+    rows = np.array(matrix.array, dtype=np.float64)
+    fixed = np.array([i in matrix.lin_set for i in range(len(rows))], dtype=bool)
+    return HPolytope(-rows[~fixed, 1:], rows[~fixed, 0], -rows[fixed, 1:], rows[fixed, 0])
+
+
+def from_polytope(other: Any) -> HPolytope:
+    """Set of a `polytope.Polytope` (attributes A and b)."""
+    return HPolytope(other.A, np.ravel(other.b))
+
+
+def to_polytope(P: HPolytope) -> Any:
+    """A `polytope.Polytope`, rows as they are (an equality as two rows; that library takes flat sets for empty).
+
+    Raises
+    ------
+    ImportError
+        If the library polytope is not installed.
+    """
+    try:
+        polytope = importlib.import_module("polytope")
+    except ImportError as error:
+        raise ImportError("to_polytope needs the library polytope: pip install polytope") from error
+    rows = to_halfspaces(P)
+    return polytope.Polytope(rows[:, :-1], -rows[:, -1], normalize=False)
+
+
+def _cdd() -> Any:
+    try:
+        import cdd
+    except ImportError as error:
+        raise ImportError("conversions with cdd need the extra 'cdd': pip install 'svo-fdi[cdd]'") from error
+    return cdd

@@ -1,0 +1,137 @@
+"""Projection on some of the coordinates: equalities first, then one of three methods on what is left.
+
+Equalities (implicit ones included) are solved exactly for the coordinates that go; what remains is a full-dimensional
+set in fewer coordinates.  Then
+
+- "fourier-motzkin" eliminates one coordinate after the other; the only method for unbounded sets, and the fastest where
+  rows are sparse;
+- "convex-hull" refines a hull of support points; the choice for dense rows, its cost goes with the facets it finds;
+- "vertices" takes the hull of projected vertices; good only while the vertices can be listed (total dimension <= 6).
+
+"auto" eliminates as long as no step forms more than 600 rows (some 10 ms), then turns to the hull of support points if
+the shadow is bounded: measured on sets of 4 to 8 coordinates and 30 to 60 rows, see ``benchmarks/polytopes.py``.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from polytopes.affine import affine_set
+from polytopes.affine_hull import explicit
+from polytopes.errors import ProjectionLimitError, UnboundedError
+from polytopes.exact import row_to_floats
+from polytopes.fourier_motzkin import eliminate
+from polytopes.hull import hull_by_supports, rows_of_points
+from polytopes.rows import Rows
+from polytopes.support import known_nonempty, maxima, outer_template
+from polytopes.vertices import vertices
+
+Floats = NDArray[np.float64]
+METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
+_CHEAP_ROWS = 600  # rows of one step; beyond, the hull of support points was faster in every measured case
+
+
+def project(
+    P: Rows, keep: Sequence[int], method: str, max_rows: int, outer: bool
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Rows A, b, C, d of ``{x_keep : x in P}``, in the order of `keep`.
+
+    Parameters
+    ----------
+    P : Rows
+    keep : sequence of int
+        Different coordinates.
+    method : str
+        One of `METHODS`.
+    max_rows : int
+        Limit on the rows of one step of Fourier-Motzkin elimination.
+    outer : bool
+        At that limit, return a superset (the template of the normals at hand) instead of raising.
+
+    Raises
+    ------
+    ProjectionLimitError
+        At the limit, without `outer`.
+    UnboundedError
+        If P is unbounded and the method needs vertices.
+    """
+    n, k = P.dim, len(keep)
+    if not known_nonempty(P):
+        return np.zeros((1, k)), np.array([-1.0]), np.empty((0, k)), np.empty(0)
+    P = explicit(P)
+    gone = [j for j in range(n) if j not in keep]
+    flat = affine_set(P.C, P.d, first=gone)
+    C, d = _equalities_left(P, keep, gone)
+    rows, rhs = flat.restrict_exactly(P.A, P.b)
+    free = [j for j in keep if j in flat.free]
+    A = np.zeros((0, k))
+    b = np.empty(0)
+    if free and rows.any():
+        order = [flat.free.index(j) for j in free] + [q for q, j in enumerate(flat.free) if j not in free]
+        some = rows.any(axis=1)
+        body = Rows(rows[some][:, order], rhs[some])
+        inner = P.program.interior.point[flat.free][order]
+        reduced, b = _project_body(body, len(free), inner, method, max_rows, outer)
+        A = np.zeros((b.size, k))
+        A[:, [list(keep).index(j) for j in free]] = reduced
+    return A, b, C, d
+
+
+def _equalities_left(P: Rows, keep: Sequence[int], gone: list[int]) -> tuple[Floats, Floats]:
+    """Equalities between the coordinates that stay."""
+    flat = affine_set(P.C, P.d, first=gone)
+    fixed = [k for k, j in enumerate(flat.pivots) if j not in gone]
+    C, d = np.zeros((len(fixed), P.dim)), np.zeros(len(fixed))
+    for row, k in enumerate(fixed):
+        entries = row_to_floats([fmpq(1), *(flat.solved[k, q] for q in range(len(flat.free) + 1))])
+        C[row, [flat.pivots[k], *flat.free]], d[row] = entries[:-1], entries[-1]
+    return C[:, list(keep)], d
+
+
+def _project_body(
+    P: Rows, k: int, inner: Floats, method: str, max_rows: int, outer: bool
+) -> tuple[Floats, Floats]:
+    """The same for a full-dimensional set of inequalities and its first k coordinates."""
+    if method == "auto":
+        return _project_automatically(P, k, inner, max_rows, outer)
+    if method == "vertices":
+        return rows_of_points(vertices(P)[:, :k])[:2]
+    if method == "convex-hull":
+        return hull_by_supports(lambda directions: _shadow_points(P, directions), inner[:k])
+    try:
+        return eliminate(P.A, P.b, list(range(k, P.dim)), inner, max_rows)
+    except ProjectionLimitError:
+        if not outer:
+            raise
+        return _template(P, k)
+
+
+def _project_automatically(P: Rows, k: int, inner: Floats, max_rows: int, outer: bool) -> tuple[Floats, Floats]:
+    """Fourier-Motzkin as long as it stays cheap; then the hull of support points, if the shadow is bounded."""
+    axes = np.eye(k, P.dim)
+    result = maxima(P, np.vstack([axes, -axes]))
+    if result is None or not np.isfinite(result.values).all():
+        return _project_body(P, k, inner, "fourier-motzkin", max_rows, outer)
+    try:
+        return eliminate(P.A, P.b, list(range(k, P.dim)), inner, min(max_rows, _CHEAP_ROWS))
+    except ProjectionLimitError:
+        return _project_body(P, k, inner, "convex-hull", max_rows, outer)
+
+
+def _shadow_points(P: Rows, directions: Floats) -> Floats:
+    """Projected support points along directions (m, k) of the shadow."""
+    k = directions.shape[1]
+    result = maxima(P, np.hstack([directions, np.zeros((len(directions), P.dim - k))]))
+    if result is None or not np.isfinite(result.values).all():
+        raise UnboundedError("the projection is unbounded; only method='fourier-motzkin' can describe it.")
+    return result.points[:, :k]
+
+
+def _template(P: Rows, k: int) -> tuple[Floats, Floats]:
+    """A superset of the shadow: its supports along the parts of the rows, and along the axes."""
+    normals = np.vstack([P.A[:, :k], np.eye(k), -np.eye(k)])
+    normals = np.unique(normals[normals.any(axis=1)], axis=0)
+    T, h = outer_template(P, np.hstack([normals, np.zeros((len(normals), P.dim - k))]))
+    return T[:, :k], h
