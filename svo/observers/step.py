@@ -29,9 +29,14 @@ class Step(Protocol):
         The template set of the current state; empty once the model is falsified.
     """
 
-    verdict: VerdictName
-    certificate: Any
-    seconds: float
+    @property
+    def verdict(self) -> VerdictName: ...
+
+    @property
+    def certificate(self) -> Any: ...
+
+    @property
+    def seconds(self) -> float: ...
 
     @property
     def box(self) -> tuple[Array, Array]: ...
