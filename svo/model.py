@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,6 +83,16 @@ class Layout:
         return (rows.stop - rows.start,) if name in "ac" else (rows.stop - rows.start, cols.stop - cols.start)
 
 
+class _Scheduled(NamedTuple):
+    """An array that is a function of the schedule, and where it stands in the stack."""
+
+    item: int
+    name: str
+    where: tuple[Any, ...]
+    shape: tuple[int, ...]
+    function: Callable[[Any], ArrayLike]
+
+
 @dataclass(frozen=True)
 class UncertainModel:
     """An uncertain linear (parameter-varying) model in discrete time.
@@ -129,8 +139,9 @@ class UncertainModel:
     schedule: Any = None
     layout: Layout = field(init=False, repr=False)
     _constant: Array = field(init=False, repr=False)
-    _scheduled: tuple[tuple[int, str, Callable[[Any], ArrayLike]], ...] = field(init=False, repr=False)
+    _scheduled: tuple[_Scheduled, ...] = field(init=False, repr=False)
     _bounds: tuple[Any, Any, Any] = field(init=False, repr=False)
+    _bounds_scheduled: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainties", tuple(self.uncertainties))
@@ -140,7 +151,8 @@ class UncertainModel:
         constant, scheduled = self._split()
         object.__setattr__(self, "_constant", constant)
         object.__setattr__(self, "_scheduled", scheduled)
-        object.__setattr__(self, "_bounds", self._disturbance_bounds() + (self._noise_bound(),))
+        object.__setattr__(self, "_bounds", (*self._disturbance_bounds(), self._noise_bound()))
+        object.__setattr__(self, "_bounds_scheduled", any(callable(b) for b in self._bounds))
         self.stack(self.schedule)
         self.bounds(self.schedule)
         self._check_names()
@@ -166,7 +178,7 @@ class UncertainModel:
     @property
     def is_scheduled(self) -> bool:
         """Whether any array or bound is a function of the schedule."""
-        return bool(self._scheduled) or any(callable(b) for b in self._bounds)
+        return bool(self._scheduled) or self._bounds_scheduled
 
     @property
     def uses_input_in_output(self) -> bool:
@@ -191,20 +203,20 @@ class UncertainModel:
         if not self._scheduled:
             return self._constant
         stack = self._constant.copy()
-        for item, name, function in self._scheduled:
-            rows, cols = self.layout.block(name)
-            value = np.asarray(function(schedule), dtype=float)
-            if value.shape != self.layout.block_shape(name):
-                raise ValueError(self._shape_message(item, name, value.shape) + f", at schedule {schedule!r}")
-            stack[item, rows, cols] = value[:, None] if value.ndim == 1 else value
+        for entry in self._scheduled:
+            value = np.asarray(entry.function(schedule), dtype=float)
+            if value.shape != entry.shape:
+                raise ValueError(self._shape_message(entry.item, entry.name, value.shape) + f", at schedule {schedule!r}")
+            stack[entry.where] = value
         return stack
 
     def bounds(self, schedule: Any = None) -> tuple[Array, Array, Array]:
         """Disturbance bounds (nw,), (nw,) and noise half-width (ny,) at one sample."""
+        if not self._bounds_scheduled:
+            return self._bounds
         lower, upper, noise = (np.asarray(b(schedule), dtype=float) if callable(b) else b for b in self._bounds)
-        if any(callable(b) for b in self._bounds):
-            _check_box(lower, upper, self.layout.nw)
-            _check_noise(noise, self.layout.ny)
+        _check_box(lower, upper, self.layout.nw)
+        _check_noise(noise, self.layout.ny)
         return lower, upper, noise
 
     def block(self, name: str, schedule: Any = None, uncertainty: int | None = None) -> Array:
@@ -359,7 +371,7 @@ class UncertainModel:
         nw = E.shape[1] if E is not None else (F.shape[1] if F is not None and F.ndim == 2 else 0)
         return Layout(n=A.shape[0], nu=0 if B is None else B.shape[1], nw=nw, ny=C.shape[0])
 
-    def _split(self) -> tuple[Array, tuple[tuple[int, str, Callable[[Any], ArrayLike]], ...]]:
+    def _split(self) -> tuple[Array, tuple[_Scheduled, ...]]:
         constant = np.zeros((1 + len(self.uncertainties), *self.layout.shape))
         scheduled = []
         for item, owner in enumerate((self, *self.uncertainties)):
@@ -371,11 +383,12 @@ class UncertainModel:
                 assert array is not None
                 if array.shape != self.layout.block_shape(name):
                     raise ValueError(self._shape_message(item, name, array.shape))
+                rows, cols = self.layout.block(name)
+                where = (item, rows, cols.start if array.ndim == 1 else cols)
                 if callable(value):
-                    scheduled.append((item, name, value))
+                    scheduled.append(_Scheduled(item, name, where, array.shape, value))
                 else:
-                    rows, cols = self.layout.block(name)
-                    constant[item, rows, cols] = array[:, None] if array.ndim == 1 else array
+                    constant[where] = array
         constant.setflags(write=False)
         return constant, tuple(scheduled)
 

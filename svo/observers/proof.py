@@ -215,7 +215,11 @@ class _Check:
             for side in range(2):
                 multiplier = s.on_channel[q, side]
                 if multiplier:
-                    m, slope, intercept = exact(multiplier), exact(s.lines[q, 2 * side]), exact(s.lines[q, 2 * side + 1])
+                    m, slope, intercept = (
+                        exact(multiplier),
+                        exact(s.lines[q, 2 * side]),
+                        exact(s.lines[q, 2 * side + 1]),
+                    )
                     self._check_line(1 - 2 * side, slope, intercept, (lo, hi), (low, high))
                     if m < 0:
                         raise _NoProof
@@ -286,7 +290,9 @@ def certificate_of(window: dict[str, Any], size: Sizes, arrival: ArrivalSet) -> 
                 s_upper=window["s_upper"][v].copy(),
                 lines=window["lines"][v].copy(),
                 on_output=rows[: size.ny],
-                on_w=rows[size.ny : size.ny + size.nh],
+                on_w=_with_bounds(
+                    rows[size.ny : size.ny + size.nh], window["w_rows_lower"], window["w_rows_upper"]
+                ),
                 on_channel=np.maximum(on_channel, 0.0),
             )
         )
@@ -301,6 +307,11 @@ def certificate_of(window: dict[str, Any], size: Sizes, arrival: ArrivalSet) -> 
         w_rows_lower=window["w_rows_lower"].copy(),
         w_rows_upper=window["w_rows_upper"].copy(),
         arrival=arrival,
-        on_arrival=multiplier[: size.na].copy(),
+        on_arrival=_with_bounds(multiplier[: size.na], arrival.lower, arrival.upper),
         samples=tuple(samples),
     )
+
+
+def _with_bounds(multipliers: Array, lower: Array, upper: Array) -> Array:
+    """Multipliers without those on an infinite bound: rounding leaves such of the order of 1e-18."""
+    return np.where(np.isfinite(np.where(multipliers > 0, upper, lower)), multipliers, 0.0)

@@ -36,9 +36,9 @@ CONSISTENT, EMPTY_CANDIDATE, UNDECIDED = 0, 1, 2
 # -- memory ------------------------------------------------------------------------------------------------
 
 # sizes: n states, nu inputs, nw disturbances, ny sensors, nq channels, nh rows on w, nt template directions,
-# na rows on the arrival state besides its box, ni items of a stack, N steps, K largest basis, late = 1 if the
-# output depends on w or a channel
-Sizes = namedtuple("Sizes", "n nu nw ny nq nh nt na ni N K late")
+# na rows on the arrival state besides its box, ni items of a stack, N steps that the window holds at most, of which
+# it drops `block` at once, K largest basis, late = 1 if the output depends on w or a channel
+Sizes = namedtuple("Sizes", "n nu nw ny nq nh nt na ni N block K late")
 
 CLOCK = ("base", "time", "pending", "started", "pivots", "stops", "programs", "refactored")
 BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED = range(8)
@@ -57,7 +57,7 @@ FLOATS = {
     "A": "Snn", "drift": "Sn", "drift_mag": "Sn", "inputs": "Snv",
     # centres and half-widths of v and of the arrival state
     "vc": "Vv", "vr": "Vv", "xc": "n", "xr": "n",
-    # template, arrival bounds of T x at the base, the next ones that wait for the slide, box of the newest state
+    # template, arrival bounds of T x at the base, the next ones (at base + block) that wait for the slide, box of the newest state
     "T": "tn", "h_lower": "t", "h_upper": "t", "new_lower": "t", "new_upper": "t", "box_lower": "n", "box_upper": "n",
     # data as given, for proofs
     "stack": "SiXP", "u": "Su", "y": "Sy", "noise": "Sy", "slack": "Sy", "w_lower": "Vw", "w_upper": "Vw",
@@ -68,12 +68,14 @@ FLOATS = {
     "delta": "q2", "w_rows": "hw", "w_rows_lower": "h", "w_rows_upper": "h",
     # one basis inverse a direction; multipliers of an empty window
     "inverse": "QKK", "farkas": "R",
+    # tiny fixed change of the cost, against cycling
+    "jitter": "Z",
     # scratch of the simplex
-    "nu": "K", "d": "Z", "z": "Z", "act": "R", "vio": "R", "alpha": "Z", "wk": "K", "uk": "K", "cost": "Z",
+    "nu": "K", "d": "Z", "z": "Z", "act": "R", "vio": "R", "alpha": "Z", "wk": "K", "uk": "K", "cost": "Z", "true_cost": "Z",
     "ratio": "J", "pivot": "J", "drop": "J", "move": "J", "M": "KL", "T2": "KK",
 }  # fmt: skip
 INTEGERS = {
-    "clock": "8", "rows": "QK", "cols": "QK", "k": "Q", "seen_base": "Q", "seen_time": "Q", "status": "QZ",
+    "clock": "8", "rows": "QK", "cols": "QK", "k": "Q", "seen_base": "Q", "status": "QZ",
     "candidate": "J", "chosen": "J", "at_upper": "K", "owner": "q",
 }  # fmt: skip
 
@@ -1145,29 +1147,34 @@ def _anchor(w, size):
 
 @njit(cache=True, error_model="numpy")
 def _slide(w, size):
-    """Drop the oldest sample: the state at base + 1 is what the arrival bounds say."""
+    """Drop the oldest samples: the state at base + block is what the arrival bounds say."""
     n, nv = size.n, size.nw + size.nq
     nr = size.ny + size.nh + 2 * size.nq
     base = w.clock[BASE]
-    first = n + (base % (size.N + size.late)) * nv
-    G, GT, psi = w.G, w.GT, w.psi
-    for j in range(first, first + nv):
-        for i in range(G.shape[0]):
-            GT[j, i] = 0.0
-            G[i, j] = 0.0
-        for i in range(n):
-            psi[i, j] = 0.0
-    start = size.na + (base % (size.N + 1)) * nr
-    for i in range(start, start + nr):
-        _clear_row(w, i)
+    for k in range(base, base + size.block):
+        _drop_columns(w, n + (k % (size.N + size.late)) * nv, nv)
+        start = size.na + (k % (size.N + 1)) * nr
+        for i in range(start, start + nr):
+            _clear_row(w, i)
     for i in range(size.nt):
         w.h_lower[i] = min(w.new_lower[i], w.new_upper[i])
         w.h_upper[i] = max(w.new_lower[i], w.new_upper[i])
-    w.clock[BASE] = base + 1
+    w.clock[BASE] = base + size.block
     w.clock[PENDING] = 0
     _anchor(w, size)
     _rebuild(w, size)
     _arrival_rows(w, size)
+
+
+@njit(cache=True, error_model="numpy")
+def _drop_columns(w, first, count):
+    G, GT, psi = w.G, w.GT, w.psi
+    for j in range(first, first + count):
+        for i in range(G.shape[0]):
+            GT[j, i] = 0.0
+            G[i, j] = 0.0
+        for i in range(psi.shape[0]):
+            psi[i, j] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -1219,50 +1226,56 @@ def _cold(w, q):
 
 @njit(cache=True, error_model="numpy")
 def _prepare(w, size, q):
-    """Carry the basis of direction q over to the present window."""
-    base, time = w.clock[BASE], w.clock[TIME]
-    base_then, time_then = w.seen_base[q], w.seen_time[q]
-    w.seen_base[q], w.seen_time[q] = base, time
-    if base == base_then and time == time_then:
+    """Carry the basis of direction q over to the present window: what was dropped since leaves it."""
+    base, base_then = w.clock[BASE], w.seen_base[q]
+    w.seen_base[q] = base
+    if base == base_then:
         return
-    if base_then < 0 or base > base_then + 1 or time > time_then + 1:
+    if base_then < 0:
         _cold(w, q)
         return
     n, nv = size.n, size.nw + size.nq
     nr = size.ny + size.nh + 2 * size.nq
-    V = size.N + size.late
-    status = w.status[q]
-    if base > base_then:
-        first = n + (base_then % V) * nv
-        start = size.na + (base_then % (size.N + 1)) * nr
-        touched, p, c = False, 0, 0
-        for a in range(w.k[q]):
-            i = w.rows[q, a]
-            if start <= i < start + nr:
-                touched = True
-            else:
-                touched = touched or i < size.na
-                w.rows[q, p] = i
-                p += 1
-        for b in range(w.k[q]):
-            j = w.cols[q, b]
-            if first <= j < first + nv:
-                touched = True
-                status[j] = AT_CENTRE
-            else:
-                touched = touched or j < n
-                w.cols[q, c] = j
-                c += 1
-        for j in range(first, first + nv):
+    S, V = size.N + 1, size.N + size.late
+    dropped = base - base_then
+    status, rows, cols = w.status[q], w.rows[q], w.cols[q]
+    p, c = 0, 0
+    touched = False
+    for a in range(w.k[q]):
+        i = rows[a]
+        age = ((i - size.na) // nr - base_then) % S  # samples since base_then, for rows of samples
+        if i >= size.na and age < dropped:
+            touched = True
+        else:
+            touched = touched or i < size.na
+            rows[p] = i
+            p += 1
+    for b in range(w.k[q]):
+        j = cols[b]
+        if j >= n and ((j - n) // nv - base_then) % V < dropped:
+            touched = True
+        else:
+            touched = touched or j < n
+            cols[c] = j
+            c += 1
+    for j in range(n, status.shape[0]):
+        if ((j - n) // nv - base_then) % V < dropped:
             status[j] = AT_CENTRE
-        if touched:
-            w.k[q] = _eliminate(w, q, p, c, 1e-6)
+    if touched:
+        w.k[q] = _eliminate(w, q, p, c, 1e-6)
 
 
 @njit(cache=True, error_model="numpy")
 def maximise(w, size, q, limit):
     """Outer bound of max cost'z over the window, from the basis of direction q. Returns (outcome, bound)."""
+    cost, jitter = w.cost, w.jitter
     _prepare(w, size, q)
+    scale = 0.0
+    for j in range(cost.shape[0]):
+        scale = max(scale, abs(cost[j]))
+    for j in range(cost.shape[0]):
+        w.true_cost[j] = cost[j]
+        cost[j] += scale * jitter[j]
     outcome = _solve(w, q, limit)
     if outcome == EMPTY and _farkas_gap(w) >= 0.0:
         w.clock[REFACTORED] += 1
@@ -1275,27 +1288,40 @@ def maximise(w, size, q, limit):
                 outcome = STOPPED
     if outcome == STOPPED:
         w.clock[STOPS] += 1
+    _copy(cost, w.true_cost)
     return outcome, _outer_value(w, q, w.k[q])
 
 
 @njit(cache=True, error_model="numpy")
 def _arrival_cost(w, size, i, sign):
-    """Objective sign T_i x(base + 1) over z; returns its value at z = 0 and the rounding of both."""
+    """Objective sign T_i x(base + block) over z; returns its value at z = 0 and the rounding of both.
+
+    Of a window that is not full yet, the newest state if it comes before.
+    """
     n, nv = size.n, size.nw + size.nq
     base = w.clock[BASE]
-    s, t, v = base % (size.N + 1), (base + 1) % (size.N + 1), base % (size.N + size.late)
-    _fill(w.cost, 0.0)
+    target = min(base + size.block, w.clock[TIME])
+    t = target % (size.N + 1)
+    costate, moved = np.zeros(n), np.zeros(n)
     constant, rounding = 0.0, 0.0
     for r in range(n):
-        weight = sign * w.T[i, r]
-        if weight == 0.0:
-            continue
-        for j in range(n):
-            w.cost[j] += weight * w.A[s, r, j] * w.xr[j]
+        costate[r] = sign * w.T[i, r]
+        constant += costate[r] * w.phi[t, r]
+        rounding += abs(costate[r]) * (w.err[t, r] + 2.0 * UNIT * (size.block * (n + 8)) * w.mag[t, r])
+    _fill(w.cost, 0.0)
+    for k in range(target - 1, base - 1, -1):
+        s, first = k % (size.N + 1), n + (k % (size.N + size.late)) * nv
+        A, inputs = w.A[s], w.inputs[s]
         for j in range(nv):
-            w.cost[n + v * nv + j] += weight * w.inputs[s, r, j]
-        constant += weight * w.phi[t, r]
-        rounding += abs(weight) * (w.err[t, r] + 2.0 * UNIT * (n + 8) * w.mag[t, r])
+            for r in range(n):
+                w.cost[first + j] += costate[r] * inputs[r, j]
+        for j in range(n):
+            moved[j] = 0.0
+            for r in range(n):
+                moved[j] += costate[r] * A[r, j]
+        _copy(costate, moved)
+    for j in range(n):
+        w.cost[j] = costate[j] * w.xr[j]
     return constant, rounding
 
 
@@ -1345,7 +1371,7 @@ ARRIVAL, NEWEST, CHANNELS = range(3)
 def solve(w, size, task, start, limit):
     """The programs of a task, from number `start` on: two a direction, upper bound first.
 
-    ARRIVAL decides emptiness and, once the window is full, bounds the state at base + 1; NEWEST bounds the newest
+    ARRIVAL decides emptiness and, once the window is full, bounds the state at base + block; NEWEST bounds the newest
     state; CHANNELS tightens the bounds of s that leave its sign open. Returns (verdict, program that found the
     window empty or -1).
     """
@@ -1392,7 +1418,24 @@ def solve(w, size, task, start, limit):
 
 # -- one sample --------------------------------------------------------------------------------------------
 
-FINE, BAD_NUMBER, RANK_ROSE, SIGN_OPEN = range(4)
+FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE = range(6)
+
+
+@njit(cache=True, error_model="numpy")
+def _check_numbers(u, u_next, y, stack):
+    """NaN and Inf have no place here, but for NaN in y (a missing sensor)."""
+    for j in range(u.shape[0]):
+        if not (np.isfinite(u[j]) and np.isfinite(u_next[j])):
+            return BAD_INPUT
+    for value in y:
+        if np.isinf(value):
+            return BAD_OUTPUT
+    for item in range(stack.shape[0]):
+        for row in range(stack.shape[1]):
+            for value in stack[item, row]:
+                if not np.isfinite(value):
+                    return BAD_MATRIX
+    return FINE
 
 
 @njit(cache=True, error_model="numpy")
@@ -1420,11 +1463,9 @@ def enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, 
     w_old bounds the disturbance of the transition; w that of the new sample, used where the output has it.
     Returns FINE, SIGN_OPEN (solve CHANNELS before `complete`), or an error that leaves the window as it was.
     """
-    for item in range(stack.shape[0]):
-        for row in range(stack.shape[1]):
-            for value in stack[item, row]:
-                if not np.isfinite(value):
-                    return BAD_NUMBER
+    error = _check_numbers(u, u_next, y, stack)
+    if error != FINE:
+        return error
     if w.clock[PENDING] == 1:
         _slide(w, size)
     k = w.clock[TIME]
