@@ -1,0 +1,92 @@
+"""The Eclipse as a registered plant."""
+
+import numpy as np
+import pytest
+
+from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER, REFERENCE, Eclipse, eclipse
+from aircraft.eclipse.simulator import Surrogate
+from aircraft.eclipse.trim import level_trim
+from polytopes import HPolytope
+from svo.plant import Plant, load_plant
+
+PLANT = eclipse()
+
+
+def test_it_is_registered_and_satisfies_the_protocol():
+    plant = load_plant("eclipse")
+    assert isinstance(plant, Plant)
+    assert isinstance(plant, Eclipse)
+    assert (plant.name, plant.Ts, plant.fault_time) == ("eclipse", 0.01, 0.5)
+    assert plant.noise_sets == ("quiet", "conservative")
+    assert dict(plant.faults) == dict.fromkeys(("alpha", "elevator", "dynamics"), ("step", "hard", "soft"))
+
+
+@pytest.mark.parametrize(
+    ("fault", "profile", "seconds"),
+    [("none", "", 10.0), ("alpha", "step", 5.5), ("alpha", "hard", 6.5), ("alpha", "soft", 10.0)],
+)
+def test_runs_have_the_stated_length(fault, profile, seconds):
+    log = PLANT.simulate(fault, profile, "quiet", 0)
+    assert PLANT.duration(fault, profile) == seconds
+    assert len(log) == round(seconds / PLANT.Ts)
+    np.testing.assert_allclose(np.diff(log.time), PLANT.Ts)
+
+
+def test_log_has_one_column_a_channel_and_the_schedule_of_the_scheduler():
+    log, columns = PLANT.simulate("elevator", "step", "quiet", 1), PLANT.columns
+    for array, names in ((log.u, columns.inputs), (log.y, columns.outputs), (log.x, columns.states)):
+        assert array.shape == (len(log), len(names))
+    scheduler = PLANT.scheduler()
+    np.testing.assert_array_equal(log.schedule, [scheduler(y) for y in log.y])
+    every = [columns.time, *(c.name for c in (*columns.inputs, *columns.outputs, *columns.states))]
+    assert len(set(every)) == len(every)
+
+
+def test_a_run_depends_on_nothing_but_its_seed():
+    sequence = np.random.SeedSequence(5, spawn_key=(3,))
+    first, second = (PLANT.simulate("dynamics", "soft", "conservative", sequence) for _ in range(2))
+    other_plant = eclipse().simulate("dynamics", "soft", "conservative", np.random.SeedSequence(5, spawn_key=(3,)))
+    np.testing.assert_array_equal(first.y, second.y)
+    np.testing.assert_array_equal(first.y, other_plant.y)
+
+
+def test_every_fault_and_profile_has_a_reference():
+    assert set(REFERENCE) == {(fault, profile) for fault, profiles in PLANT.faults.items() for profile in profiles}
+    assert (REFERENCE["alpha", "step"].detect, REFERENCE["alpha", "soft"].isolate) == ("0.01", "about 3.5")
+
+
+def test_banks_are_fresh_and_named_as_the_faults():
+    first, second = PLANT.bank("quiet"), PLANT.bank("quiet")
+    assert tuple(first.names) == ("nominal", *PLANT.faults)
+    assert first.observers["nominal"] is not second.observers["nominal"]
+
+
+def test_initial_set_holds_every_start_between_25_and_55():
+    box = HPolytope.box(INITIAL_LOWER, INITIAL_UPPER)
+    for V in np.linspace(25, 55, 7):
+        assert box.contains(level_trim(Surrogate(), V).x)
+
+
+@pytest.mark.parametrize("fault", PLANT.faults)
+def test_quiet_step_is_detected_and_isolated_as_the_paper_says(fault):
+    log, bank = PLANT.simulate(fault, "step", "quiet", 11), PLANT.bank("quiet")
+    record = bank.run(log)
+    first_faulty = round(PLANT.fault_time / PLANT.Ts)
+    assert record.detected_at - first_faulty == (0 if fault == "alpha" else 1)
+    assert record.fault == fault
+    assert record.died_at[fault] is None
+
+
+def test_unknown_noise_and_reference_are_refused():
+    with pytest.raises(ValueError, match="loud"):
+        PLANT.models("loud")
+    with pytest.raises(ValueError, match="relative"):
+        eclipse("relative")
+
+
+def test_deviation_reference_changes_the_dynamics_fault_only():
+    deviation = eclipse("deviation")
+    for fault, same in (("elevator", True), ("dynamics", False)):
+        ours, theirs = (p.simulate(fault, "step", "quiet", 0).y for p in (PLANT, deviation))
+        assert (ours == theirs).all() == same
+    assert deviation.models("quiet")["dynamics"].block("a", 37.0, 0)[3] < 0
