@@ -116,7 +116,7 @@ class WindowObserver:
         y = self._outputs(y0)
         inputs = self._inputs("u", u, self.model.uses_input_in_output)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
-        return self._sample(True, inputs, inputs, y, stack, noise, (w_lower, w_upper), begun)
+        return self._sample(True, np.zeros(self.model.n_inputs), inputs, y, stack, noise, (w_lower, w_upper), begun)
 
     def step(
         self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
@@ -144,7 +144,7 @@ class WindowObserver:
             return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
         outputs = self._outputs(y)
         inputs = self._inputs("u", u, True)
-        following = self._inputs("u_next", u_next, True) if self.model.uses_input_in_output else inputs
+        following = self._inputs("u_next", u_next, self.model.uses_input_in_output)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
         if not self._started:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
@@ -243,7 +243,7 @@ class WindowObserver:
 
     def _inputs(self, name: str, u: ArrayLike | None, needed: bool) -> Array:
         size = self.model.n_inputs
-        if u is None and (size == 0 or not needed):
+        if not needed or (u is None and size == 0):
             return np.zeros(size)
         if u is None:
             raise ValueError(
