@@ -3,6 +3,7 @@
 from polytopes.certificate import Certificate
 from polytopes.emptiness import Emptiness
 from polytopes.errors import EmptySetError, ProjectionLimitError, UnboundedError, UndecidedError
+from polytopes.generators import Generators
 from polytopes.hpolytope import HPolytope, convex_hull
 from polytopes.linear_program import warm_up
 from polytopes.support import Ball, SupportResult
@@ -12,6 +13,7 @@ __all__ = [
     "Certificate",
     "Emptiness",
     "EmptySetError",
+    "Generators",
     "HPolytope",
     "ProjectionLimitError",
     "SupportResult",

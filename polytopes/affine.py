@@ -92,7 +92,7 @@ class AffineSet:
         if not self.pivots:
             return A, b
         exact = [self._restricted(row, value) for row, value in zip(A, b, strict=True)]
-        table = [row_to_floats([*coefficients, constant]) for coefficients, constant in exact]
+        table = [row_to_floats(coefficients, constant) for coefficients, constant in exact]
         both = np.array(table).reshape(len(b), len(self.free) + 1)
         return both[:, :-1], both[:, -1]
 

@@ -33,8 +33,10 @@ def to_cdd(P: HPolytope) -> Any:
         If pycddlib is not installed.
     """
     rows = np.vstack([np.hstack([P.b[:, None], -P.A]), np.hstack([P.d[:, None], -P.C])])
+    if not len(rows):  # a matrix without rows would lose the dimension
+        rows = np.append(1.0, np.zeros(P.dim))[None]
     matrix = _cdd().matrix_from_array(rows.tolist(), rep_type=_cdd().RepType.INEQUALITY)
-    matrix.lin_set = set(range(P.b.size, len(rows)))
+    matrix.lin_set = set(range(P.b.size, P.b.size + P.d.size))
     return matrix
 
 

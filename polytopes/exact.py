@@ -38,21 +38,23 @@ def to_floats(values: Iterable[fmpq]) -> NDArray[np.float64]:
     return np.array([int(v.p) / int(v.q) for v in values], dtype=np.float64)
 
 
-def row_to_floats(values: Sequence[fmpq]) -> NDArray[np.float64]:
-    """A row as floats, up to a positive factor: exact where it is a multiple of integers below 2^53.
+def row_to_floats(coefficients: Sequence[fmpq], constant: fmpq) -> NDArray[np.float64]:
+    """A row and its constant (last) as floats, up to a positive factor.
 
-    ``x - y / 3 <= 1`` becomes ``3 x - y <= 3``, whose floats are still parallel to what they were.
+    The coefficients are exact where they are a multiple of integers below 2^53: ``x - y / 3 <= 1`` becomes
+    ``3 x - y <= 3``, so that rows that were parallel stay so.
     """
-    largest = max((abs(v) for v in values), default=ZERO)
+    largest = max((abs(v) for v in coefficients), default=ZERO)
     if largest == 0:
-        return np.zeros(len(values))
+        return to_floats([*coefficients, constant])
     denominator, divisor = fmpz(1), fmpz(0)
-    for v in values:
+    for v in coefficients:
         denominator = denominator.lcm(v.q)
-    for v in values:
+    for v in coefficients:
         divisor = divisor.gcd((v * denominator).p)
     factor = fmpq(denominator, divisor)
-    return to_floats(v * factor if largest * factor <= _INTEGERS else v / largest for v in values)
+    factor = factor if largest * factor <= _INTEGERS else 1 / largest
+    return to_floats(v * factor for v in [*coefficients, constant])
 
 
 def combine(rows: NDArray[np.float64], rhs: NDArray[np.float64], multipliers: Multipliers) -> tuple[list[fmpq], fmpq]:

@@ -12,6 +12,7 @@ from polytopes import support as support_functions
 from polytopes.affine_hull import affine_dim
 from polytopes.emptiness import Emptiness
 from polytopes.errors import as_array, as_matrix, as_vector
+from polytopes.generators import Generators, generators, rows_of_generators
 from polytopes.hull import rows_of_points
 from polytopes.redundancy import minimal_rows
 from polytopes.rows import Rows
@@ -65,14 +66,17 @@ class HPolytope(Rows):
         return cls(np.vstack([axes[above], -axes[below]]), np.concatenate([high[above], -low[below]]))
 
     @classmethod
-    def from_vertices(cls, V: ArrayLike) -> Self:
-        """Convex hull of points (k, n), k >= 1.
+    def from_vertices(cls, V: ArrayLike, rays: ArrayLike | None = None) -> Self:
+        """Convex hull of points (k, n), k >= 1, plus the cone of the rays (r, n) if there are any.
 
-        Points within 1e-12 of their spread of a subspace give explicit equalities.  Qhull, in scaled coordinates.
+        Qhull, in scaled coordinates.  Without rays, points within 1e-12 of their spread of a subspace give explicit
+        equalities; with rays, points and rays that lie exactly in one.
         """
         points = as_array("V", V, 2)
         if 0 in points.shape:
             raise ValueError(f"V has shape {points.shape}; expected one or more points (none: HPolytope.empty).")
+        if rays is not None:
+            return cls(*rows_of_generators(points, as_matrix("rays", rays, points.shape[1])))
         return cls(*rows_of_points(points))
 
     @classmethod
@@ -194,6 +198,16 @@ class HPolytope(Rows):
             If the set is unbounded.
         """
         return vertices(self)
+
+    def generators(self) -> Generators:
+        """Vertices, rays and lines of a nonempty set, bounded or not; see `Generators`.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        """
+        return generators(self)
 
     def volume(self) -> float:
         """n-dimensional volume: 0 for flat and empty sets, inf for unbounded full-dimensional ones."""

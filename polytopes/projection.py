@@ -85,7 +85,8 @@ def _equalities_left(P: Rows, keep: Sequence[int], gone: list[int]) -> tuple[Flo
     fixed = [k for k, j in enumerate(flat.pivots) if j not in gone]
     C, d = np.zeros((len(fixed), P.dim)), np.zeros(len(fixed))
     for row, k in enumerate(fixed):
-        entries = row_to_floats([fmpq(1), *(flat.solved[k, q] for q in range(len(flat.free) + 1))])
+        solved = [flat.solved[k, q] for q in range(len(flat.free) + 1)]
+        entries = row_to_floats([fmpq(1), *solved[:-1]], solved[-1])
         C[row, [flat.pivots[k], *flat.free]], d[row] = entries[:-1], entries[-1]
     return C[:, list(keep)], d
 

@@ -1,0 +1,84 @@
+"""Vertices, rays and lines of any set, and rows from them: both are the generators of a cone.
+
+The cone ``{y : G y <= 0}`` is the sum of its lines (the null space of G, exact) and a pointed cone, whose rays are the
+vertices of a bounded slice ``w'y = 1`` with ``w = -sum g_i``, positive all over the pointed cone.  A set
+``{x : A x <= b, C x = d}`` is the slice t = 1 of the cone ``A x <= b t``, ``C x = d t``, ``t >= 0`` (Minkowski-Weyl).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from polytopes.affine import affine_set
+from polytopes.errors import EmptySetError
+from polytopes.exact import row_to_floats
+from polytopes.rows import Rows
+from polytopes.support import known_nonempty
+from polytopes.vertices import vertices
+
+Floats = NDArray[np.float64]
+_AT_INFINITY = 1e-11  # a generator whose t is this small beside its x is a direction
+
+
+@dataclass(frozen=True, eq=False)
+class Generators:
+    """``conv(vertices) + cone(rays) + span(lines)``: arrays (k, n), (r, n) and (l, n).
+
+    With lines, the vertices and rays are those of the part of the set across the lines (some coordinates zero).
+    """
+
+    vertices: Floats
+    rays: Floats
+    lines: Floats
+
+
+def generators(P: Rows) -> Generators:
+    """Vertices, rays and lines of a nonempty set.
+
+    Raises
+    ------
+    EmptySetError
+        If P is empty.
+    """
+    if not known_nonempty(P):
+        raise EmptySetError("the empty set has no generators; ask emptiness() first.")
+    size = P.program.size
+    equalities = np.hstack([P.C, -P.d[:, None] / size])
+    last = np.append(np.zeros(P.dim), -1.0)
+    rays, lines = _cone(np.vstack([np.hstack([P.A, -P.b[:, None] / size]), last, equalities, -equalities]))
+    directions, t = rays[:, :-1], rays[:, -1] / size
+    finite = rays[:, -1] > _AT_INFINITY * np.abs(directions).max(axis=1, initial=0.0)
+    corners = directions[finite] / t[finite, None]
+    if not len(corners):
+        corners = P.program.interior.point[None].copy()
+    return Generators(corners, directions[~finite], lines[:, :-1])
+
+
+def rows_of_generators(V: Floats, rays: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Rows A, b, C, d of ``conv(V) + cone(rays)``: the generators of the cone of all rows that hold."""
+    k = len(V)
+    holds = np.vstack([np.hstack([V, -np.ones((k, 1))]), np.hstack([rays, np.zeros((len(rays), 1))])])
+    found, equalities = _cone(holds)
+    proper = np.abs(found[:, :-1]).max(axis=1, initial=0.0) > _AT_INFINITY * np.abs(found[:, -1])
+    return found[proper, :-1], found[proper, -1], equalities[:, :-1], equalities[:, -1]
+
+
+def _cone(G: Floats) -> tuple[Floats, Floats]:
+    """Extreme rays and lines of ``{y : G y <= 0}``."""
+    n = G.shape[1]
+    null = affine_set(G, np.zeros(len(G)))
+    lines = np.zeros((len(null.free), n))
+    for q in range(len(null.free)):
+        line = null.lift_exactly([fmpq(int(q == k)) for k in range(len(null.free))])
+        lines[q] = row_to_floats(line[:-1], line[-1])
+    across = G[:, null.pivots]
+    lengths = np.linalg.norm(across, axis=1)
+    slicing = -(across[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0)
+    rays = np.zeros((0, n))
+    if slicing.any():
+        corners = vertices(Rows(across, np.zeros(len(G)), slicing[None], [1.0]))
+        rays = np.zeros((len(corners), n))
+        rays[:, null.pivots] = corners
+    return rays, lines
