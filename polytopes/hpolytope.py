@@ -346,21 +346,23 @@ class HPolytope(Rows):
         return type(self)(*support_functions.outer_template(self, normals))
 
     def plot(self, ax: Any = None, dims: Sequence[int] = (0, 1), **style: Any) -> list[Any]:
-        """Draw the projection on two coordinates; returns the matplotlib artists.
+        """Draw the projection on two or three coordinates; returns the matplotlib artists.
+
+        An unbounded set is cut at a box, a flat one is a face, a line or a point, and the empty set draws nothing.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
-            New axes if absent.
-        dims : two ints
+            New axes if absent; for three coordinates they must be 3-D.
+        dims : two or three ints
             The coordinates on the axes.
         **style
             Passed to the matplotlib patch.
         """
         pair = tuple(int(j) for j in dims)
-        if len(pair) != 2 or len(set(pair)) != 2 or not all(0 <= j < self.dim for j in pair):
-            raise ValueError(f"dims is {tuple(dims)}; expected two different coordinates below {self.dim}.")
-        return plotting.plot(self, ax, (pair[0], pair[1]), style)
+        if len(pair) not in (2, 3) or len(set(pair)) != len(pair) or not all(0 <= j < self.dim for j in pair):
+            raise ValueError(f"dims is {tuple(dims)}; expected two or three different coordinates below {self.dim}.")
+        return plotting.plot(self, ax, pair, style)
 
 
 def convex_hull(sets: Sequence[HPolytope]) -> HPolytope:

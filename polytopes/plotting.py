@@ -1,14 +1,17 @@
-"""Pictures of sets: the shadow of a set on two coordinates."""
+"""Pictures of sets: the shadow of a set on two or three coordinates."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.projection import project
 from polytopes.rows import Rows
 from polytopes.support import bounding_box, known_nonempty, support_points
+from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
+_MAX_ROWS = 20_000
 
 
 def shadow(P: Rows, dims: tuple[int, int]) -> Floats:
@@ -51,44 +54,78 @@ def _without_repeats(points: Floats, reach: float) -> Floats:
     return points[keep] if keep else points[:1]
 
 
-def plot(P: Rows, ax: Any, dims: tuple[int, int], style: dict[str, Any]) -> list[Any]:
-    """Draw the shadow of P on two coordinates; returns the artists.
+def plot(P: Rows, ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list[Any]:
+    """Draw the shadow of P on two or three coordinates; returns the artists.
 
-    An unbounded set is cut at a box around what the axes show (or around its largest ball), a flat one is a line or a
-    point, and the empty set draws nothing.
+    An unbounded set is cut at a box around what the axes show (or around its largest ball), a flat one is a face, a
+    line or a point, and the empty set draws nothing.
     """
     import matplotlib.pyplot as plt  # imported here: not every user draws
-    from matplotlib.patches import Polygon
 
     if ax is None:
-        ax = plt.subplots()[1]
+        ax = plt.figure().add_subplot(projection="3d" if len(dims) == 3 else None)
     if not known_nonempty(P):
         return []
-    outline = shadow(_cut(P, ax, dims), dims)
-    if len(outline) == 1:
-        style = {key: value for key, value in style.items() if key != "facecolor"}
-        return list(ax.plot(*outline.T, marker="o", **style))
+    body = _cut(P, ax, dims)
     edge = {} if "color" in style else {"edgecolor": "black"}
-    patch = Polygon(outline, closed=True, **{"alpha": 0.4, **edge, **style})
+    if len(dims) == 2:
+        return _draw_polygon(ax, shadow(body, (dims[0], dims[1])), {"alpha": 0.4, **edge, **style})
+    return _draw_faces(ax, Rows(*project(body, dims, "auto", _MAX_ROWS, False)), {"alpha": 0.4, **edge, **style})
+
+
+def _draw_polygon(ax: Any, outline: Floats, style: dict[str, Any]) -> list[Any]:
+    from matplotlib.patches import Polygon
+
+    if len(outline) == 1:
+        return _draw_stick(ax, outline, style)
+    patch = Polygon(outline, closed=True, **style)
     ax.add_patch(patch)
     ax.autoscale_view()
     return [patch]
 
 
-def _cut(P: Rows, ax: Any, dims: tuple[int, int]) -> Rows:
-    """P itself, or P within a box in the two coordinates if its shadow is unbounded."""
-    lower, upper = bounding_box(P)
-    lower, upper = lower[list(dims)], upper[list(dims)]
+def _draw_faces(ax: Any, P: Rows, style: dict[str, Any]) -> list[Any]:
+    """Faces of a bounded set in three dimensions."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+    corners = vertices(P)
+    if len(corners) < 3:
+        return _draw_stick(ax, corners, style)
+    reach = 1e-9 * max(1e-300, float(np.ptp(corners, axis=0).max()))
+    lengths = np.linalg.norm(P.A, axis=1)
+    faces = [corners[np.abs(corners @ a - b) <= reach * size] for a, b, size in zip(P.A, P.b, lengths, strict=True)]
+    faces = [corners] if P.d.size else [face for face in faces if len(face) >= 3]
+    solid = Poly3DCollection([_around(face) for face in faces], **style)
+    ax.add_collection3d(solid)
+    ax.auto_scale_xyz(*corners.T)
+    return [solid]
+
+
+def _draw_stick(ax: Any, corners: Floats, style: dict[str, Any]) -> list[Any]:
+    """A segment or a point."""
+    line = {"color": style.get("color", style.get("facecolor", "black")), "alpha": style["alpha"]}
+    return list(ax.plot(*corners.T, marker="o" if len(corners) == 1 else None, **line))
+
+
+def _around(face: Floats) -> Floats:
+    """Corners of a planar face in the order of their angle."""
+    offsets = face - face.mean(axis=0)
+    _, _, axes = np.linalg.svd(offsets)
+    flat = offsets @ axes[:2].T
+    return face[np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))]
+
+
+def _cut(P: Rows, ax: Any, dims: tuple[int, ...]) -> Rows:
+    """P itself, or P within a box in the given coordinates if its shadow is unbounded."""
+    kept = list(dims)
+    lower, upper = (bound[kept] for bound in bounding_box(P))
     if np.isfinite(lower).all() and np.isfinite(upper).all():
         return P
-    centre = P.program.interior.point[list(dims)]
-    known = np.concatenate([[1.0], np.abs(np.concatenate([lower, upper]) - np.tile(centre, 2))])
+    centre = P.program.interior.point[kept]
+    known = np.abs(np.concatenate([[1.0], lower - centre, upper - centre]))
     room = 3.0 * float(known[np.isfinite(known)].max())
     if ax.has_data():
-        limits = np.array([ax.get_xlim(), ax.get_ylim()])
+        limits = np.array([getattr(ax, f"get_{name}lim")() for name in "xyz"[: len(kept)]])
         room = max(room, float(np.abs(limits - centre[:, None]).max()))
-    frame = np.zeros((2, P.dim))
-    frame[[0, 1], dims] = 1.0
-    return P.with_rows(
-        np.vstack([P.A, frame, -frame]), np.concatenate([P.b, centre + room, room - centre])
-    )
+    frame = np.eye(P.dim)[kept]
+    return P.with_rows(np.vstack([P.A, frame, -frame]), np.concatenate([P.b, centre + room, room - centre]))

@@ -36,6 +36,26 @@ def test_shadow_of_a_turned_cube_has_the_support_of_the_cube() -> None:
     assert (turns > 0.0).all()
 
 
+@pytest.mark.parametrize("name", [name for name, P in CATALOGUE.items() if P.dim == 2])
+@pytest.mark.parametrize("height", [0.0, 1.0, np.inf])
+def test_every_kind_of_set_can_be_drawn_in_space(name: str, height: float) -> None:
+    prism = CATALOGUE[name].product(HPolytope.box([0.0], [height]))
+    artists = prism.plot(dims=(0, 1, 2), color="tab:blue")
+    assert len(artists) == (0 if name in EMPTY else 1)
+    plt.gcf().canvas.draw()
+    plt.close("all")
+
+
+def test_faces_of_a_cube() -> None:
+    (solid,) = CATALOGUE["cube"].plot(dims=(2, 0, 1))
+    faces = list(solid._faces)
+    assert len(faces) == 6
+    for face in faces:
+        edges = np.roll(face, -1, axis=0) - face
+        assert np.sort(np.count_nonzero(np.abs(edges) > 1e-12, axis=1)).tolist() == [1, 1, 1, 1]
+    plt.close("all")
+
+
 def test_dims_are_checked() -> None:
     with pytest.raises(ValueError, match="dims is"):
         CATALOGUE["cube"].plot(dims=(0, 3))
