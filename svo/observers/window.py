@@ -13,6 +13,7 @@ from polytopes import HPolytope
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
+from svo.observers.fallback import candidates, is_feasible
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
 from svo.observers.step import VerdictName
 
@@ -289,13 +290,30 @@ class WindowObserver:
         while True:
             verdict, program = kernel.solve(self._window, self._size, task, start, kernel.PIVOT_LIMIT)
             if verdict != kernel.EMPTY_CANDIDATE:
-                return "consistent" if verdict == kernel.CONSISTENT else "undecided"
-            if task == kernel.ARRIVAL:
-                certificate = certificate_of(self._arrays, self._size, self._arrival())
-                if certificate.verify():
-                    self._falsified = certificate
-                    return "falsified"
+                break
+            if task == kernel.ARRIVAL and self._prove():
+                return "falsified"
             start = program + 1
+        if verdict == kernel.CONSISTENT:
+            return "consistent"
+        return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
+
+    def _prove(self) -> bool:
+        """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
+        certificate = certificate_of(self._arrays, self._size, self._arrival())
+        if certificate.verify():
+            self._falsified = certificate
+        return self._falsified is not None
+
+    def _ask_highs(self) -> VerdictName:
+        w = self._arrays
+        feasible, ray = is_feasible(w["G"], w["lower"], w["upper"])
+        if feasible is False:
+            for multipliers in candidates(ray):
+                w["farkas"][:] = multipliers
+                if self._prove():
+                    return "falsified"
+        return "consistent" if feasible else "undecided"
 
     def _box_at(self, sample: int) -> tuple[Array, Array]:
         if self._falsified is not None:
