@@ -4,11 +4,15 @@ Sets are `polytopes.HPolytope`. Faults are in `svo.faults`, indices in `svo.indi
 plants in `svo.plant`, studies in `svo.study`; the command line is ``svo --help``.
 """
 
-from svo.isolation.architectures import ArchitectureI
-from svo.isolation.record import BankRecord, Verdict
-from svo.log import Log
-from svo.model import UncertainModel, Uncertainty
-from svo.observers.window import WindowObserver
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from svo.isolation.architectures import ArchitectureI
+    from svo.isolation.record import BankRecord, Verdict
+    from svo.log import Log
+    from svo.model import UncertainModel, Uncertainty
+    from svo.observers.window import WindowObserver
 
 __all__ = [
     "ArchitectureI",
@@ -19,3 +23,20 @@ __all__ = [
     "Verdict",
     "WindowObserver",
 ]
+
+_HOMES = {
+    "ArchitectureI": "svo.isolation.architectures",
+    "BankRecord": "svo.isolation.record",
+    "Log": "svo.log",
+    "UncertainModel": "svo.model",
+    "Uncertainty": "svo.model",
+    "Verdict": "svo.isolation.record",
+    "WindowObserver": "svo.observers.window",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Imported when asked for: the command line must not wait for compiled kernels to print its help.
+    if name not in _HOMES:
+        raise AttributeError(f"module 'svo' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

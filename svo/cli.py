@@ -97,11 +97,13 @@ def study(
         from svo.study.configuration import StudyConfiguration
         from svo.study.publish import publish
         from svo.study.runner import run_study, warm_up
+        from svo.study.store import StudyFolder
 
         the_plant = load_plant(plant)
         configuration = StudyConfiguration.for_plant(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or ()
         )
+        StudyFolder(out).check(configuration, resume)
         _announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
         with _progress("Runs") as update:
@@ -362,13 +364,14 @@ def _print_detection(found: Detection) -> None:
         typer.echo(f"Fault detected at {found.detected_s:g} s: the nominal model is falsified ({found.noise} noise).")
         if found.isolated_s is not None:
             typer.echo(f"Fault isolated at {found.isolated_s:g} s: {found.record.fault}.")
-        else:
-            why = "more than one fault explains" if found.alive else "no model explains"
-            typer.echo(f"Not isolated: {why} the data.")
+        elif found.alive:
+            typer.echo("Not isolated: more than one model explains the data.")
     for alarm in found.alarms:
         typer.echo(f"    {alarm.observer}: falsified at {alarm.time:g} s")
     for name in found.alive:
         typer.echo(f"    {name}: explains the data to the end")
+    if not found.alive:
+        typer.echo(f"No model explains the data from {max(alarm.time for alarm in found.alarms):g} s on.")
     undecided = int(found.record.undecided.sum())
     if undecided:
         typer.echo(f"    undecided answers: {undecided}")

@@ -6,6 +6,7 @@ import os
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -141,6 +142,7 @@ def check_fault(plant: Plant, fault: str, profile: str | None = None) -> None:
         raise ValueError(f"fault {fault!r} has no profile {profile!r}; it has {', '.join(plant.faults[fault])}")
 
 
+@cache
 def versions() -> dict[str, str]:
     """Versions of the software and the kind of machine, for the record."""
     return {

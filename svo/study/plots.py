@@ -133,7 +133,7 @@ def plot_bounds(
 def separating_states(exemplar: Exemplar) -> tuple[int, ...]:
     """The two states (or the only one) in which the models' boxes drift furthest apart, relative to their widths."""
     centre, width = (exemplar.lower + exemplar.upper) / 2, exemplar.upper - exemplar.lower
-    both: NDArray[np.bool_] = np.isfinite(centre).all(axis=2)
+    both = np.asarray(np.isfinite(centre).all(axis=2))
     n = exemplar.x.shape[1]
     apart = np.zeros(n)
     for i in range(len(exemplar.names)):

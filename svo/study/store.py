@@ -52,8 +52,8 @@ class StudyFolder:
     def alarms(self) -> Path:
         return self.path / "alarms.jsonl"
 
-    def open(self, configuration: StudyConfiguration, resume: bool) -> set[int]:
-        """Make the folder ready and return the numbers of the runs that it already holds.
+    def check(self, configuration: StudyConfiguration, resume: bool) -> None:
+        """Raise an error if the study cannot be run into this folder.
 
         Raises
         ------
@@ -67,14 +67,18 @@ class StudyFolder:
                     f"{self.path} is not empty; give --resume to go on with the study in it, or another folder"
                 )
             self._check_same(configuration)
+
+    def open(self, configuration: StudyConfiguration, resume: bool) -> set[int]:
+        """Make the folder ready and return the numbers of the runs that it already holds; raises as `check`."""
+        self.check(configuration, resume)
         self.path.mkdir(parents=True, exist_ok=True)
+        if not self._identity.exists():
+            text = json.dumps({"configuration": configuration.to_dict(), "versions": versions()}, indent=2) + "\n"
+            write_whole(self._identity, lambda file: file.write_text(text, encoding="utf-8"))
         for part in (self.parts, self._alarm_parts, self._exemplars):
             part.mkdir(exist_ok=True)
             for unfinished in part.glob(".*"):
                 unfinished.unlink()
-        if not self._identity.exists():
-            text = json.dumps({"configuration": configuration.to_dict(), "versions": versions()}, indent=2) + "\n"
-            write_whole(self._identity, lambda file: file.write_text(text, encoding="utf-8"))
         return {int(part.stem.removeprefix("run-")) for part in self.parts.glob("run-*.parquet")}
 
     def write(self, outcome: RunOutcome, configuration: StudyConfiguration) -> None:
@@ -152,8 +156,6 @@ def write_whole(path: Path, write: Callable[[Path], Any]) -> None:
     """Write a file under another name, then rename it: it appears whole or not at all."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     write(temporary)
-    with temporary.open("rb+") as file:
-        os.fsync(file.fileno())
     temporary.replace(path)
 
 
