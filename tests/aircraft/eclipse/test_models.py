@@ -162,8 +162,8 @@ def test_measuring_seeds_are_disjoint_from_those_of_a_study():
 
 def test_measured_bounds_are_reproducible_and_their_file_reads_back(tmp_path):
     first, second = (measure(SCENARIOS, 1) for _ in range(2))
-    text = to_toml(first, 1, 1.5)
-    assert text == to_toml(second, 1, 1.5)
+    text = to_toml(first, 1)
+    assert text == to_toml(second, 1)
     shipped = read_bounds()
     for noise, observers in first.items():
         assert set(observers) == set(shipped[noise]) == {"nominal", *FAULTS}
@@ -174,8 +174,8 @@ def test_measured_bounds_are_reproducible_and_their_file_reads_back(tmp_path):
 
 
 def test_file_states_how_it_was_measured():
-    text = to_toml(measure(SCENARIOS, 1), 1, 1.5)
-    assert "python -m aircraft.eclipse.mismatch --runs 1 --margin 1.5" in text
+    text = to_toml(measure(SCENARIOS, 1), 1)
+    assert "python -m aircraft.eclipse.mismatch --runs 1" in text
 
 
 def test_bad_bounds_are_refused():
