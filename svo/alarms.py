@@ -94,7 +94,8 @@ def verify_alarms(path: str | Path, log: Log | None = None) -> list[AlarmCheck]:
 
 
 def _lines(path: str | Path) -> list[tuple[int, str]]:
-    with open(path, encoding="utf-8") as file:
+    # Bytes that are no text make a bad line, like any other damage.
+    with open(path, encoding="utf-8", errors="replace") as file:
         return [(number, text) for number, text in enumerate(file, start=1) if text.strip()]
 
 

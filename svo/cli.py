@@ -15,8 +15,9 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from svo.alarms import AlarmCheck
+    from svo.alarms import Alarm, AlarmCheck
     from svo.detect import Detection
+    from svo.log import Log
     from svo.plant import Plant
     from svo.study.summary import ConditionSummary
 
@@ -219,18 +220,8 @@ def verify(
     """
     with _one_line_errors():
         from svo.alarms import read_alarms, verify_alarms
-        from svo.log_file import read_log
-        from svo.plant import load_plant
 
-        data = None
-        if log is not None:
-            names = {str(alarm.source["plant"]) for alarm in read_alarms(alarms)}
-            if len(names) != 1:
-                raise ValueError(
-                    f"{alarms} has alarms of {len(names)} plants; expected those of one, to read {log} by its columns"
-                )
-            the_plant = load_plant(names.pop())
-            data = read_log(log, the_plant.columns, the_plant.Ts)
+        data = None if log is None else _log_of(alarms, read_alarms(alarms), log)
         checks = verify_alarms(alarms, data)
         if as_json:
             _print_json(
@@ -270,6 +261,21 @@ def _need_study_extra() -> None:
         raise ValueError(
             "svo study needs pyarrow, which is not installed; install the extra: pip install 'svo-fdi[study]'"
         )
+
+
+def _log_of(path: Path, alarms: Sequence[Alarm], log: Path) -> Log | None:
+    """The log to compare alarms with, read by the columns of their plant; None if there are no alarms."""
+    from svo.log_file import read_log
+    from svo.plant import load_plant
+
+    if not alarms:
+        return None
+    if any(alarm.source != alarms[0].source for alarm in alarms):
+        raise ValueError(
+            f"{path} has alarms of several runs; --log is the log of one, so give the alarms of that run alone"
+        )
+    plant = load_plant(str(alarms[0].source.get("plant")))
+    return read_log(log, plant.columns, plant.Ts)
 
 
 def _noise(plant: Plant, noise: str | None) -> str:
@@ -380,7 +386,8 @@ def _print_detection(found: Detection) -> None:
 def _print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:
     failed = [check for check in checks if not check.ok]
     for check in failed:
-        typer.echo(f"{path}, line {check.line} ({check.observer}, sample {check.sample}): {check.reason}", err=True)
+        whose = f" ({check.observer}, sample {check.sample})" if check.sample >= 0 else ""
+        typer.echo(f"{path}, line {check.line}{whose}: {check.reason}", err=True)
     seconds = sum(check.seconds for check in checks)
     typer.echo(
         f"{path}: {len(checks) - len(failed)} of {len(checks)} alarms proven in exact arithmetic, in {seconds:.2f} s"

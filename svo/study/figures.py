@@ -112,10 +112,10 @@ def _alive(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
             ax.set_title(f"{exemplar.fault}, {exemplar.profile}")
             if ax is not row[0]:
                 ax.set_yticklabels([])
-            if row is not axes[-1]:
-                ax.set_xlabel("")
         for ax in row[len(chosen) :]:
             ax.set_axis_off()
+    for ax in axes[:-1].ravel():
+        ax.set_xlabel("")
     return figure
 
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from svo.plant import HEALTHY, Column, Reference
 from svo.study.exemplar import Exemplar, Snapshot
@@ -102,6 +101,7 @@ def plot_sets(
         for patch in set(drawn) & set(ax.patches):
             patch.set(alpha=None, edgecolor=tone[name], facecolor=(tone[name], FILL))
         artists += drawn
+    artists += _circles(ax)
     true = exemplar.x[snapshot.sample, list(dims)]
     artists += ax.plot(*true, "x", color="#111111", markersize=7, markeredgewidth=1.8, zorder=5)
     ax.margins(0.08)
@@ -199,6 +199,18 @@ def _reference_marks(ax: Axes, at: np.ndarray, texts: Sequence[str]) -> list[Art
 
 def _fault_line(ax: Axes) -> Artist:
     return ax.axvline(0.0, color="#111111", linewidth=1.0, linestyle=(0, (4, 3)), zorder=3)
+
+
+def _circles(ax: Axes) -> list[Artist]:
+    """A circle around each patch that is too small to be seen."""
+    whole = ax.dataLim
+    artists: list[Artist] = []
+    for patch in ax.patches:
+        box = patch.get_path().get_extents()
+        if max(box.width / whole.width, box.height / whole.height) < 0.04:
+            centre = (box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2
+            artists += ax.plot(*centre, "o", color=patch.get_edgecolor(), markersize=10, fillstyle="none", zorder=4)
+    return artists
 
 
 def _label(column: Column) -> str:

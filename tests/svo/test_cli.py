@@ -105,6 +105,17 @@ def test_an_alarm_with_a_changed_number_is_rejected(log: Path, tmp_path: Path) -
     assert "1 of 2 alarms proven" in result.stdout
 
 
+def test_what_is_no_alarm_is_a_failed_one(registered_tank: str, tmp_path: Path) -> None:
+    for content in (b"hello\n", b"{}\n", b"[1]\n", bytes(range(128, 256))):
+        (tmp_path / "alarms.jsonl").write_bytes(content)
+        result = svo("verify", tmp_path / "alarms.jsonl")
+        assert result.exit_code == 1
+        assert "0 of 1 alarms proven" in result.stdout
+        assert "alarms.jsonl, line 1: " in result.stderr
+    (tmp_path / "alarms.jsonl").write_text("")
+    assert svo("verify", tmp_path / "alarms.jsonl").exit_code == 0
+
+
 def test_a_healthy_log_has_no_fault(registered_tank: str, tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     assert svo("simulate", "tank", "--out", path).exit_code == 0
@@ -167,6 +178,8 @@ def test_a_study_prints_its_table_and_writes_its_files(registered_tank: str, tmp
     assert len(again["summary"]) == 8
     assert "noise was" in one_line(svo("study", "tank", "--runs", "2", "--out", out, "--resume"))
     assert svo("verify", out / "alarms.jsonl").exit_code == 0
+    svo("simulate", "tank", "--out", tmp_path / "log.csv")
+    assert "several runs" in one_line(svo("verify", out / "alarms.jsonl", "--log", tmp_path / "log.csv"))
 
 
 def test_a_row_of_the_run_table_can_be_simulated_and_verified(registered_tank: str, tmp_path: Path) -> None:
