@@ -1,10 +1,12 @@
 """The observers' models: discretisation, contents, and the true flight inside each of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from aircraft.eclipse.derivatives import Derivatives
-from aircraft.eclipse.mismatch import SPAWN_KEY, measure, mismatch, seeds, to_toml
+from aircraft.eclipse.mismatch import SPAWN_KEY, largest, measure, mismatch, seeds, to_toml
 from aircraft.eclipse.models import MismatchBounds, ScheduledModel, read_bounds
 from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.scenarios import FAULTS, HEALTHY, LARGEST, PROFILES, TS, Scenarios, corrupt
@@ -150,6 +152,34 @@ def test_euler_costs_fifty_times_the_mismatch_in_theta():
     x = run.flight.x[:, :4]
     euler = np.abs(x[1:, 2] - (x[:-1, 2] + TS * x[:-1, 3])).max()  # the theta row of I + Ts A, at any airspeed
     assert euler > 50 * exact
+
+
+def test_filtered_airspeed_beats_the_raw_one_in_steady_flight_and_a_frozen_model_elsewhere():
+    def worst(fault, profile, schedule):
+        run = SCENARIOS.run(fault, profile, "conservative", 0)
+        return np.abs(mismatch(replace(run, schedule=schedule(run)), SCENARIOS).state).max(axis=0)
+
+    def raw(run):
+        return run.flight.y[:, 0]
+
+    def filtered(run):
+        return run.schedule
+
+    def frozen(run):
+        return np.full(len(run.time), 37.0)
+
+    assert (worst(HEALTHY, "", filtered) < 0.8 * worst(HEALTHY, "", raw)).all()
+    assert (worst(HEALTHY, "", frozen)[:2] < worst(HEALTHY, "", raw)[:2]).all()
+    for fault, profile in (("elevator", "step"), ("dynamics", "soft")):  # the airspeed changes by metres per second
+        assert (worst(fault, profile, filtered)[2:] < 0.4 * worst(fault, profile, frozen)[2:]).all()
+
+
+@pytest.mark.slow
+def test_a_margin_of_1_2_does_not_cover_fault_free_flight():
+    measured = largest(SCENARIOS, HEALTHY, "conservative", 300).state
+    flights = (np.random.SeedSequence(99, spawn_key=(i,)) for i in range(1000))
+    seen = [mismatch(SCENARIOS.run(HEALTHY, "", "conservative", seed), SCENARIOS).state for seed in flights]
+    assert (np.abs(seen).max(axis=(0, 1)) / measured).max() > 1.5
 
 
 def test_measuring_seeds_are_disjoint_from_those_of_a_study():

@@ -90,3 +90,10 @@ def test_deviation_reference_changes_the_dynamics_fault_only():
         ours, theirs = (p.simulate(fault, "step", "quiet", 0).y for p in (PLANT, deviation))
         assert (ours == theirs).all() == same
     assert deviation.models("quiet")["dynamics"].block("a", 37.0, 0)[3] < 0
+
+
+def test_dynamics_fault_in_deviation_coordinates_is_explained_by_the_nominal_model():
+    deviation = eclipse("deviation")
+    record = deviation.bank("quiet").run(deviation.simulate("dynamics", "step", "quiet", 0))
+    assert record.detected_at is None
+    assert record.alive.all()
