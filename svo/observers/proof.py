@@ -8,11 +8,13 @@ recursion
 
 and the window is empty if the multiplied rows exceed their bounds at every point of the variables' boxes. What a
 window proves is conditional on its arrival set and on the stated bounds of each channel's s; both are outer
-bounds that the observer computed before.
+bounds that the observer computed before. An uncertainty enters as the sum of its channels, which is the model's
+own matrix but for the rounding of that factorisation (`FACTOR_TOLERANCE`, checked).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +26,7 @@ from svo.observers.window_kernel import BASE, TIME, Sizes, channel_factors
 
 Array = NDArray[np.float64]
 ZERO = fmpq(0)
+FACTOR_TOLERANCE = 2e-12  # relative; the observer takes a stack whose channels leave out less than 1e-12
 
 
 def exact(value: float) -> fmpq:
@@ -118,11 +121,72 @@ class WindowCertificate:
     samples: tuple[WindowSample, ...]
 
     def verify(self) -> bool:
-        """Check the proof in exact rational arithmetic; True only if it proves that the window is empty."""
+        """Check the proof in exact rational arithmetic; True only if it proves that the window is empty.
+
+        False, and no error, for arrays of wrong shapes, for NaN or Inf out of place and for intervals whose ends are
+        in the wrong order: a stored certificate may hold anything.
+        """
+        if not _is_well_formed(self):
+            return False
         try:
             return _Check(self).gap() > 0
         except _NoProof:
             return False
+
+
+def _is_well_formed(c: WindowCertificate) -> bool:
+    """Whether every array has its shape and finite numbers, and every interval its ends in order."""
+    if not (isinstance(c.n, int) and c.samples and len(c.samples) == c.last - c.first + 1):
+        return False
+    if not all(_holds(value, shape, kind, bounded) for value, shape, kind, bounded in _expected_arrays(c)):
+        return False
+    intervals = [
+        c.delta.T,
+        (c.w_rows_lower, c.w_rows_upper),
+        (c.arrival.box_lower, c.arrival.box_upper),
+        (c.arrival.lower, c.arrival.upper),
+        *((s.w_lower, s.w_upper) for s in c.samples),
+        *((s.s_lower, s.s_upper) for s in c.samples),
+        *((-s.noise, s.noise) for s in c.samples),
+        *((-s.slack, s.slack) for s in c.samples),
+    ]
+    ordered = all(np.all(lower <= upper) for lower, upper in intervals)
+    return ordered and bool(np.all((c.owner > 0) & (c.owner < len(c.samples[0].stack))))
+
+
+def _holds(value: Any, shape: tuple[int, ...], kind: type, bounded: bool) -> bool:
+    if not (isinstance(value, np.ndarray) and value.dtype == kind and value.shape == shape):
+        return False
+    return not bounded or bool(np.isfinite(value).all())
+
+
+def _expected_arrays(c: WindowCertificate) -> Iterator[tuple[Any, tuple[int, ...], type, bool]]:
+    """Every array of a certificate with its shape, its type, and whether it must be finite.
+
+    What may be infinite (bounds of rows) or NaN (a missing sensor) is looked at where it is used.
+    """
+    head, real = c.samples[0], np.float64
+    n, nu, ny, nw = c.n, np.size(head.u), np.size(head.y), np.size(head.w_lower)
+    nq, nh, na = np.size(c.owner), np.size(c.w_rows_lower), np.size(c.on_arrival)
+    rows, columns = n + ny, n + nu + 1 + nw
+    yield c.owner, (nq,), np.int64, True
+    yield c.delta, (nq, 2), real, True
+    yield c.w_rows, (nh, nw), real, True
+    yield from ((v, (nh,), real, False) for v in (c.w_rows_lower, c.w_rows_upper))
+    yield from ((v, (n,), real, True) for v in (c.arrival.box_lower, c.arrival.box_upper))
+    yield c.arrival.rows, (na, n), real, True
+    yield from ((v, (na,), real, False) for v in (c.arrival.lower, c.arrival.upper))
+    yield c.on_arrival, (na,), real, True
+    for s in c.samples:
+        yield s.stack, (np.size(head.stack) // (rows * columns), rows, columns), real, True
+        yield s.u, (nu,), real, True
+        yield s.y, (ny,), real, False
+        yield from ((v, (ny,), real, True) for v in (s.noise, s.slack, s.on_output))
+        yield from ((v, (nw,), real, True) for v in (s.w_lower, s.w_upper))
+        yield from ((v, (nq,), real, True) for v in (s.s_lower, s.s_upper))
+        yield s.lines, (nq, 4), real, True
+        yield s.on_w, (nh,), real, True
+        yield s.on_channel, (nq, 2), real, True
 
 
 class _NoProof(Exception):
@@ -139,8 +203,6 @@ class _Check:
     def gap(self) -> fmpq:
         """Least value of the multiplied rows minus their bounds; positive proves emptiness."""
         c = self.c
-        if len(c.samples) != c.last - c.first + 1 or not c.samples:
-            raise _NoProof
         costate = [ZERO] * c.n
         for index in range(len(c.samples) - 1, -1, -1):
             costate = self._sample(c.samples[index], costate, index == len(c.samples) - 1)
@@ -161,8 +223,6 @@ class _Check:
         self.total -= multiplier * exact(bound)
 
     def _box(self, coefficient: fmpq, lower: float, upper: float) -> None:
-        if not lower <= upper or not np.isfinite(lower) or not np.isfinite(upper):
-            raise _NoProof
         self.total += _interval_min(coefficient, exact(lower), exact(upper))
 
     def _sample(self, s: WindowSample, after: list[fmpq], newest: bool) -> list[fmpq]:
@@ -179,7 +239,7 @@ class _Check:
         if active:
             self._channels(s, weight, known)
             self._disturbance(s, known[n + nu + 1 :])
-        elif any(known[n + nu + 1 :]) or np.any(s.on_channel) or np.any(s.on_w):
+        elif any(known[n + nu + 1 :]) or np.any(s.stack[1:, n:]) or np.any(s.on_channel) or np.any(s.on_w):
             raise _NoProof
         for value, coefficient in zip(s.u, known[n : n + nu], strict=True):
             if coefficient:
@@ -188,7 +248,7 @@ class _Check:
         return known[:n]
 
     def _output(self, s: WindowSample, o: int, m: fmpq) -> fmpq:
-        if not np.isfinite(s.y[o]) or not s.noise[o] >= 0 or not s.slack[o] >= 0:
+        if not np.isfinite(s.y[o]):
             raise _NoProof
         reach = exact(s.noise[o]) + exact(s.slack[o])
         self.total -= m * (exact(s.y[o]) + (reach if m > 0 else -reach))
@@ -204,12 +264,11 @@ class _Check:
 
     def _channels(self, s: WindowSample, weight: list[fmpq], known: list[fmpq]) -> None:
         """Add each channel's p: its box, its two lines over s = functional'(x, u, 1, w), and its effect."""
-        factors = channel_factors(s.stack, self.c.owner)
-        for q, (gain, functional) in enumerate(zip(*factors, strict=True)):
+        gains, functionals = channel_factors(s.stack, self.c.owner)
+        self._check_factors(s.stack, gains, functionals)
+        for q, (gain, functional) in enumerate(zip(gains, functionals, strict=True)):
             lo, hi = (exact(v) for v in self.c.delta[q])
             low, high = exact(s.s_lower[q]), exact(s.s_upper[q])
-            if lo > hi or low > high:
-                raise _NoProof
             on_p = sum((w * exact(g) for w, g in zip(weight, gain, strict=True) if w and g), ZERO)
             on_s = ZERO
             for side in range(2):
@@ -234,6 +293,14 @@ class _Check:
                 products = [d * v for d in (lo, hi) for v in (low, high)]
                 self.total += _interval_min(on_p, min(products), max(products))
             self._check_known(s, functional, low, high)
+
+    def _check_factors(self, stack: Array, gains: Array, functionals: Array) -> None:
+        """The channels of an uncertainty add up to its matrices: none is left out, none counted twice."""
+        for item in range(1, len(stack)):
+            mine = self.c.owner == item
+            rest = np.abs(stack[item] - gains[mine].T @ functionals[mine]).max()
+            if not rest <= FACTOR_TOLERANCE * np.abs(stack[item]).max():
+                raise _NoProof
 
     @staticmethod
     def _check_line(side: int, slope: fmpq, intercept: fmpq, delta: tuple[fmpq, fmpq], s: tuple[fmpq, fmpq]) -> None:

@@ -321,7 +321,8 @@ class WindowObserver:
             return nothing, nothing.copy()
         if sample != self._time:
             raise ValueError(
-                f"the box of sample {sample} was not read before sample {self._time}; read it right after its step, or use run(log)"
+                f"the box of sample {sample} was not read before sample {self._time}; "
+                "read it right after its step, or use run(log)"
             )
         self._solve(kernel.NEWEST)
         return self._arrays["box_lower"].copy(), self._arrays["box_upper"].copy()
@@ -388,9 +389,9 @@ def _channel_owners(model: UncertainModel) -> NDArray[np.int64]:
 
 
 def _output_is_disturbed(model: UncertainModel) -> bool:
-    """Whether w or a channel enters the output."""
-    stack, layout = model.stack(model.schedule), model.layout
-    return bool(np.any(stack[0, layout.n :, layout.n + layout.nu + 1 :]) or np.any(stack[1:, layout.n :]))
+    """Whether w or a channel may enter the output, at whatever schedule."""
+    arrays = [model.F, *(array for u in model.uncertainties for array in (u.C, u.D, u.c, u.F))]
+    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
 
 
 def _rows_of(P: HPolytope) -> tuple[Array, Array, Array]:

@@ -1,0 +1,66 @@
+"""Compiled kernel of the moving-horizon window; `svo.observers.window` drives it, nothing else should.
+
+memory        every array of a window, and its compiled type
+rows, channels, motion      the window's rows, its channels of uncertainty, and how it slides
+basis, ratio_test, dual_simplex      the bounded dual simplex
+programs, sample      what Python calls: the programs of a window, and one sample of data
+"""
+
+from svo.observers.window_kernel.channels import channel_factors
+from svo.observers.window_kernel.memory import (
+    BASE,
+    CONSISTENT,
+    EMPTY_CANDIDATE,
+    PIVOT_LIMIT,
+    PIVOTS,
+    PROGRAMS,
+    REFACTORED,
+    STARTED,
+    STOPS,
+    TIME,
+    Sizes,
+    allocate,
+    new_window,
+)
+from svo.observers.window_kernel.programs import ARRIVAL, CHANNELS, NEWEST, solve
+from svo.observers.window_kernel.sample import (
+    BAD_INPUT,
+    BAD_MATRIX,
+    BAD_OUTPUT,
+    FINE,
+    RANK_ROSE,
+    SIGN_OPEN,
+    complete,
+    enter,
+    initialise,
+)
+
+__all__ = [
+    "ARRIVAL",
+    "BAD_INPUT",
+    "BAD_MATRIX",
+    "BAD_OUTPUT",
+    "BASE",
+    "CHANNELS",
+    "CONSISTENT",
+    "EMPTY_CANDIDATE",
+    "FINE",
+    "NEWEST",
+    "PIVOTS",
+    "PIVOT_LIMIT",
+    "PROGRAMS",
+    "RANK_ROSE",
+    "REFACTORED",
+    "SIGN_OPEN",
+    "STARTED",
+    "STOPS",
+    "TIME",
+    "Sizes",
+    "allocate",
+    "channel_factors",
+    "complete",
+    "enter",
+    "initialise",
+    "new_window",
+    "solve",
+]

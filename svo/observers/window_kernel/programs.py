@@ -1,0 +1,153 @@
+"""The programs that a window is asked: is it empty, what bounds the arrival state, the newest state, a channel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from svo.observers.window_kernel.channels import known_part
+from svo.observers.window_kernel.dual_simplex import maximise
+from svo.observers.window_kernel.memory import (
+    BASE,
+    CONSISTENT,
+    EMPTY,
+    EMPTY_CANDIDATE,
+    OPTIMAL,
+    PENDING,
+    TIME,
+    UNDECIDED,
+    UNIT,
+)
+from svo.observers.window_kernel.short_rows import copy, fill
+from svo.observers.window_kernel.sources import SOURCES
+
+ARRIVAL, NEWEST, CHANNELS = range(3)
+
+
+@njit(error_model="numpy")
+def _arrival_cost(w, size, i, sign):
+    """Objective sign T_i x(base + block) over z; returns its value at z = 0 and the rounding of both.
+
+    Of a window that is not full yet, the newest state if it comes before.
+    """
+    n, nv = size.n, size.nw + size.nq
+    base = w.clock[BASE]
+    target = min(base + size.block, w.clock[TIME])
+    t = target % (size.N + 1)
+    costate, moved = np.zeros(n), np.zeros(n)
+    constant, rounding = 0.0, 0.0
+    for r in range(n):
+        costate[r] = sign * w.T[i, r]
+        constant += costate[r] * w.phi[t, r]
+        rounding += abs(costate[r]) * (w.err[t, r] + 2.0 * UNIT * (size.block * (n + 8)) * w.mag[t, r])
+    fill(w.cost, 0.0)
+    for k in range(target - 1, base - 1, -1):
+        s, first = k % (size.N + 1), n + (k % (size.N + size.late)) * nv
+        A, inputs = w.A[s], w.inputs[s]
+        for j in range(nv):
+            for r in range(n):
+                w.cost[first + j] += costate[r] * inputs[r, j]
+        for j in range(n):
+            moved[j] = 0.0
+            for r in range(n):
+                moved[j] += costate[r] * A[r, j]
+        copy(costate, moved)
+    for j in range(n):
+        w.cost[j] = costate[j] * w.xr[j]
+    return constant, rounding
+
+
+@njit(error_model="numpy")
+def _channel_cost(w, size, q, sign):
+    """Objective sign s of channel q over the state; returns its value at z = 0 with w's share, and the rounding."""
+    n, Z = w.psi.shape
+    k = w.clock[TIME]
+    s, v = k % (size.N + 1), k % (size.N + size.late)
+    f = w.functional[v, q]
+    _, magnitude, centre, spread = known_part(w, size, k, q)
+    constant, rounding = sign * centre + spread, 0.0
+    for r in range(n):
+        constant += sign * f[r] * w.phi[s, r]
+        magnitude += abs(f[r]) * w.mag[s, r]
+        rounding += abs(f[r]) * w.err[s, r]
+    for j in range(Z):
+        value = 0.0
+        for r in range(n):
+            value += f[r] * w.psi[r, j]
+        w.cost[j] = sign * value
+    return constant, rounding + 2.0 * UNIT * (n + size.nu + size.nw + 8) * magnitude
+
+
+@njit(error_model="numpy")
+def _newest_cost(w, size, i, sign):
+    """Objective sign x_i of the newest state; returns its value at z = 0 and the rounding."""
+    s = w.clock[TIME] % (size.N + 1)
+    for j in range(w.psi.shape[1]):
+        w.cost[j] = sign * w.psi[i, j]
+    return sign * w.phi[s, i], w.err[s, i] + 2.0 * UNIT * (size.n + 8) * w.mag[s, i]
+
+
+@njit(error_model="numpy")
+def _store_bound(lower, upper, i, side, bound):
+    """Keep an outer bound of the pair (upper by side 0, lower by side 1)."""
+    if side == 0:
+        upper[i] = bound
+    else:
+        lower[i] = -bound
+
+
+def _compile_solve(sources):
+    @njit(cache=True, error_model="numpy")
+    def solve(w, size, task, start, limit):
+        """The programs of a task, from number `start` on: two a direction, upper bound first.
+
+        ARRIVAL decides emptiness and, once the window is full, bounds the state at base + block; NEWEST bounds the
+        newest state; CHANNELS tightens the bounds of s that leave its sign open. Returns (verdict, program that found
+        the window empty or -1).
+        """
+        sources  # noqa: B018 - in the closure, so part of the cache's key
+        base, time = w.clock[BASE], w.clock[TIME]
+        full = time - base == size.N
+        verdict = UNDECIDED
+        first, count = 0, 2 * size.nt if full else 1
+        if task == NEWEST:
+            first, count = 2 * size.nt, 2 * size.n
+        elif task == CHANNELS:
+            first, count = 2 * size.nt + 2 * size.n, 2 * size.nq
+        v = time % (size.N + size.late)
+        for program in range(start, count):
+            i, side = program // 2, program % 2
+            sign = 1.0 - 2.0 * side
+            if task == CHANNELS and not (w.s_lower[v, i] < 0.0 < w.s_upper[v, i]):
+                continue
+            if task == NEWEST:
+                constant, rounding = _newest_cost(w, size, i, sign)
+            elif task == CHANNELS:
+                constant, rounding = _channel_cost(w, size, i, sign)
+            elif time > base:
+                constant, rounding = _arrival_cost(w, size, i, sign)
+            else:
+                fill(w.cost, 0.0)
+                w.cost[0] = 1.0
+                constant, rounding = 0.0, 0.0
+            outcome, value = maximise(w, size, first + program, limit)
+            if outcome == EMPTY:
+                return EMPTY_CANDIDATE, program
+            if outcome == OPTIMAL:
+                verdict = CONSISTENT
+            bound = constant + value + rounding + 4.0 * UNIT * (abs(constant) + abs(value))
+            if task == NEWEST:
+                _store_bound(w.box_lower, w.box_upper, i, side, bound)
+            elif task == CHANNELS:
+                known = w.s_upper[v, i] if side == 0 else -w.s_lower[v, i]
+                _store_bound(w.s_lower[v], w.s_upper[v], i, side, min(bound, known))
+            elif full:
+                _store_bound(w.new_lower, w.new_upper, i, side, bound)
+        if task == ARRIVAL and full:
+            w.clock[PENDING] = 1
+        return verdict, -1
+
+    return solve
+
+
+solve = _compile_solve(SOURCES)

@@ -1,0 +1,164 @@
+"""One sample of data through the window: take it, open its variables, write its rows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from svo.observers.window_kernel.channels import bound_channels, factor_all, open_channel
+from svo.observers.window_kernel.memory import PENDING, STARTED, TIME
+from svo.observers.window_kernel.motion import advance, anchor, slide
+from svo.observers.window_kernel.rows import clear_row, measure, midpoint, scale_arrival_row, set_row
+from svo.observers.window_kernel.short_rows import copy, fill
+from svo.observers.window_kernel.sources import SOURCES
+
+FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE = range(6)
+
+
+@njit(error_model="numpy")
+def _check_numbers(u, u_next, y, stack):
+    """NaN and Inf have no place here, but for NaN in y (a missing sensor)."""
+    for j in range(u.shape[0]):
+        if not (np.isfinite(u[j]) and np.isfinite(u_next[j])):
+            return BAD_INPUT
+    for value in y:
+        if np.isinf(value):
+            return BAD_OUTPUT
+    for item in range(stack.shape[0]):
+        for row in range(stack.shape[1]):
+            for value in stack[item, row]:
+                if not np.isfinite(value):
+                    return BAD_MATRIX
+    return FINE
+
+
+@njit(error_model="numpy")
+def _store_sample(w, size, k, u, y, stack, noise):
+    s = k % (size.N + 1)
+    for item in range(size.ni):
+        for row in range(stack.shape[1]):
+            copy(w.stack[s, item, row], stack[item, row])
+    copy(w.u[s], u)
+    copy(w.y[s], y)
+    copy(w.noise[s], noise)
+
+
+@njit(error_model="numpy")
+def _bound_disturbance(w, size, k, lower, upper):
+    v = k % (size.N + size.late)
+    copy(w.w_lower[v], lower)
+    copy(w.w_upper[v], upper)
+
+
+@njit(error_model="numpy")
+def _open_slot(w, size, k):
+    """Variables v(k) = (w(k), p(k)) with their bounds, and the rows among v(k) and x(k)."""
+    n, nw, ny, nq, nh = size.n, size.nw, size.ny, size.nq, size.nh
+    nv, nr = nw + nq, ny + nh + 2 * nq
+    s, v = k % (size.N + 1), k % (size.N + size.late)
+    first = n + v * nv
+    for j in range(nw):
+        w.vc[v, j], w.vr[v, j] = midpoint(w.w_lower[v, j], w.w_upper[v, j])
+    for h in range(nh):
+        i = size.na + s * nr + ny + h
+        clear_row(w, i)
+        shift = 0.0
+        for j in range(nw):
+            w.G[i, first + j] = w.w_rows[h, j] * w.vr[v, j]
+            shift += w.w_rows[h, j] * w.vc[v, j]
+            w.row_c[i] += abs(w.w_rows[h, j] * w.vc[v, j])
+        w.raw_lower[i] = w.w_rows_lower[h] - shift
+        w.raw_upper[i] = w.w_rows_upper[h] - shift
+        set_row(w, i, s, first, nv, 0.0)
+    for q in range(nq):
+        open_channel(w, size, k, q)
+
+
+def _compile_enter(sources):
+    @njit(cache=True, error_model="numpy")
+    def enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper):
+        """Take the data of a sample: its transition from the newest one under u, and its measurement y.
+
+        w_old bounds the disturbance of the transition; w that of the new sample, used where the output has it.
+        Returns FINE, SIGN_OPEN (solve CHANNELS before `complete`), or an error that leaves the window as it was.
+        """
+        sources  # noqa: B018 - in the closure, so part of the cache's key
+        error = _check_numbers(u, u_next, y, stack)
+        if error != FINE:
+            return error
+        if w.clock[PENDING] == 1:
+            slide(w, size)
+        k = w.clock[TIME]
+        new = k if first else k + 1
+        if not first:
+            copy(w.u[k % (size.N + 1)], u)
+        opened = new if size.late == 1 else k
+        if size.late == 1:
+            _store_sample(w, size, new, u_next, y, stack, noise)
+            _bound_disturbance(w, size, new, w_lower, w_upper)
+        elif not first:
+            _bound_disturbance(w, size, k, w_old_lower, w_old_upper)
+        v = opened % (size.N + size.late)
+        opens = size.late == 1 or not first
+        if opens and not factor_all(w.stack[opened % (size.N + 1)], w.owner, w.gain[v], w.functional[v]):
+            return RANK_ROSE
+        if size.late == 0:
+            _store_sample(w, size, new, u_next, y, stack, noise)
+        elif not first:
+            advance(w, size, k)
+            w.clock[TIME] = new
+        if size.late == 0 and first:
+            return FINE
+        return SIGN_OPEN if bound_channels(w, size, opened) else FINE
+
+    return enter
+
+
+enter = _compile_enter(SOURCES)
+
+
+def _compile_complete(sources):
+    @njit(cache=True, error_model="numpy")
+    def complete(w, size, first, eps):
+        """Write the rows of the sample that `enter` took."""
+        sources  # noqa: B018 - in the closure, so part of the cache's key
+        k = w.clock[TIME]
+        if size.late == 1:
+            _open_slot(w, size, k)
+        elif not first:
+            _open_slot(w, size, k)
+            advance(w, size, k)
+            k += 1
+            w.clock[TIME] = k
+        measure(w, size, k, eps)
+        w.clock[STARTED] = 1
+
+    return complete
+
+
+complete = _compile_complete(SOURCES)
+
+
+def _compile_initialise(sources):
+    @njit(cache=True, error_model="numpy")
+    def initialise(w, size, rows, rows_lower, rows_upper):
+        """Anchor an empty window at the arrival bounds h, with extra rows on the first state."""
+        sources  # noqa: B018 - in the closure, so part of the cache's key
+        fill(w.seen_base, -1)
+        for r in range(w.G.shape[0]):
+            clear_row(w, r)
+        anchor(w, size)
+        for j in range(size.n):
+            w.psi[j, j] = w.xr[j]
+        for r in range(rows.shape[0]):
+            copy(w.row_x[r], rows[r])
+            w.raw_lower[r] = rows_lower[r]
+            w.raw_upper[r] = rows_upper[r]
+            for b in (rows_lower[r], rows_upper[r]):
+                w.row_c[r] += abs(b) if np.isfinite(b) else 0.0
+            scale_arrival_row(w, r, 0)
+
+    return initialise
+
+
+initialise = _compile_initialise(SOURCES)

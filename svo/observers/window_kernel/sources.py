@@ -1,0 +1,13 @@
+"""Digest of this package's sources, which keys its compiled cache.
+
+Numba keys a cached function by its own file and closure; it does not notice that a function which it calls from
+another file has changed, and would go on with the old code. So only the functions that Python calls are cached,
+and each has this digest in its closure.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+SOURCES = hashlib.sha256(b"".join(p.read_bytes() for p in sorted(Path(__file__).parent.glob("*.py")))).hexdigest()
