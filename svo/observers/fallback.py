@@ -41,7 +41,7 @@ def is_feasible(G: Array, lower: Array, upper: Array) -> tuple[bool | None, Arra
     if status == highspy.HighsModelStatus.kOptimal:
         return True, np.zeros(rows)
     if status == highspy.HighsModelStatus.kInfeasible:
-        _, known, ray = solver.getDualRay()
+        _, known, ray = solver.getDualRay()  # type: ignore[attr-defined]
         return False, np.asarray(ray, dtype=float) if known else np.zeros(rows)
     return None, np.zeros(rows)
 
