@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.errors import ProjectionLimitError
 from polytopes.hull import rows_of_points
 from polytopes.projection import project
 from polytopes.rows import Rows
@@ -20,6 +21,7 @@ Table = tuple[Floats, Floats, Floats, Floats]
 _DIRECT = 1e8  # condition number up to which an image is formed with the inverse of the map
 _CONSTANT = 1e-12  # relative variation of a linear form over a set that counts as none
 _MAX_ROWS = 20_000
+_CHEAP_ROWS = 1000
 
 
 def nothing(n: int) -> Table:
@@ -52,7 +54,11 @@ def affine_image(P: Rows, M: Floats, t: Floats) -> Table:
 
 
 def minkowski_sum(P: Rows, Q: Rows) -> Table:
-    """``{x + y : x in P, y in Q}``, by projecting ``{(z, y) : z - y in P, y in Q}`` on z."""
+    """``{x + y : x in P, y in Q}``.
+
+    Elimination of y from ``{(z, y) : z - y in P, y in Q}`` while that is cheap, then the hull of all sums of vertices
+    (half the time of the hull of support points where both were measured), if the sets are bounded.
+    """
     n = P.dim
     lifted = Rows(
         np.vstack([np.hstack([P.A, -P.A]), np.hstack([np.zeros((Q.b.size, n)), Q.A])]),
@@ -60,7 +66,13 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
         np.vstack([np.hstack([P.C, -P.C]), np.hstack([np.zeros((Q.d.size, n)), Q.C])]),
         np.concatenate([P.d, Q.d]),
     )
-    return project(lifted, range(n), "auto", _MAX_ROWS, False)
+    try:
+        return project(lifted, range(n), "fourier-motzkin", _CHEAP_ROWS, False)
+    except ProjectionLimitError:
+        if is_bounded(P) and is_bounded(Q):
+            sums = vertices(P)[:, None, :] + vertices(Q)
+            return rows_of_points(sums.reshape(-1, n))
+        return project(lifted, range(n), "fourier-motzkin", _MAX_ROWS, False)
 
 
 def pontryagin_difference(P: Rows, Q: Rows) -> Table:

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.errors import ProjectionLimitError
-from polytopes.linear_program import prepare
 from polytopes.redundancy import irredundant
 
 Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
+_LOG = logging.getLogger("polytopes")
 
 
 def eliminate(A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows: int) -> tuple[Floats, Floats]:
@@ -45,47 +45,46 @@ def eliminate(A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows:
         If one step would form more than `max_rows` rows.
     """
     left = list(range(A.shape[1]))
-    A, b = _pruned(A, b, inner)
+    table = _pruned(np.hstack([A, b[:, None]]), inner)
     for done in range(len(columns)):
-        j = min((left.index(c) for c in columns if c in left), key=lambda q: _growth(A[:, q]))
-        expected = _growth(A[:, j]) + b.size
-        if expected > max_rows:
+        j = min((left.index(c) for c in columns if c in left), key=_growths(table).__getitem__)
+        formed = len(table) + int(_growths(table)[j])
+        if formed > max_rows:
             raise ProjectionLimitError(
-                f"eliminating variable {done + 1} of {len(columns)} would form {expected} rows from {b.size}, more "
+                f"eliminating variable {done + 1} of {len(columns)} would form {formed} rows from {len(table)}, more "
                 f"than max_rows={max_rows}; raise the limit, use outer=True for a superset, or another method."
             )
-        A, b = _combined(A, b, j)
         del left[j]
-        A, b = _pruned(A, b, inner[left])
-        logging.getLogger("polytopes").info(
-            "eliminated variable %d of %d: %d rows formed, %d kept", done + 1, len(columns), expected, b.size
-        )
-    return A, b
-
-
-def _growth(column: Floats) -> int:
-    """Change of the number of rows when this coordinate is eliminated."""
-    positive, negative = int(np.count_nonzero(column > 0)), int(np.count_nonzero(column < 0))
-    return positive * negative - positive - negative
-
-
-def _combined(A: Floats, b: Floats, j: int) -> tuple[Floats, Floats]:
-    """All rows without x_j, and all pairs in which it cancels."""
-    rows = np.hstack([np.delete(A, j, axis=1), b[:, None]])
-    up, down = A[:, j] > 0, A[:, j] < 0
-    # Products, not quotients: rows of small integers stay exact.
-    above = rows[up][:, None, :] * -A[down, j][None, :, None]
-    below = rows[down][None, :, :] * A[up, j][:, None, None]
-    pairs, magnitude = above + below, np.abs(above) + np.abs(below)
-    # A sum of two terms below the rounding error of those terms is zero: kept, it would be a row of noise.
-    pairs[np.abs(pairs) <= 2.0 * _EPS * magnitude] = 0.0
-    table = np.vstack([rows[~(up | down)], pairs.reshape(-1, rows.shape[1])])
-    table = np.ldexp(table, -np.frexp(np.abs(table).max(axis=1, keepdims=True))[1])
+        table = _pruned(_combined(table, j), inner[left])
+        _LOG.info("eliminated variable %d of %d: %d rows formed, %d kept", done + 1, len(columns), formed, len(table))
     return table[:, :-1], table[:, -1]
 
 
-def _pruned(A: Floats, b: Floats, inner: Floats) -> tuple[Floats, Floats]:
-    n = A.shape[1]
-    program = prepare(A, b, np.empty((0, n)), np.empty(0))
-    rows = program.kept[irredundant(program, inner)]
-    return A[rows], b[rows]
+def _growths(table: Floats) -> NDArray[np.int64]:
+    """Change of the number of rows when a coordinate is eliminated, for each."""
+    positive, negative = (table > 0).sum(axis=0), (table < 0).sum(axis=0)
+    growths: NDArray[np.int64] = positive * negative - positive - negative
+    return growths
+
+
+def _combined(table: Floats, j: int) -> Floats:
+    """All rows ``[A, b]`` without x_j, and all pairs in which it cancels."""
+    column, rows = table[:, j], np.delete(table, j, axis=1)
+    up, down = column > 0, column < 0
+    # Products, not quotients: rows of small integers stay exact.
+    above = rows[up][:, None, :] * -column[down][None, :, None]
+    below = rows[down][None, :, :] * column[up][:, None, None]
+    pairs, magnitude = above + below, np.abs(above) + np.abs(below)
+    # A sum of two terms below the rounding error of those terms is zero: kept, it would be a row of noise.
+    pairs[np.abs(pairs) <= 2.0 * _EPS * magnitude] = 0.0
+    return np.vstack([rows[~(up | down)], pairs.reshape(-1, rows.shape[1])])
+
+
+def _pruned(table: Floats, inner: Floats) -> Floats:
+    """The facets among rows ``[A, b]``, scaled by powers of two."""
+    largest = np.abs(table[:, :-1]).max(axis=1)
+    table, largest = table[largest > 0.0], largest[largest > 0.0]
+    if not len(table):
+        return table
+    table = np.ldexp(table, -np.frexp(largest)[1][:, None])
+    return table[irredundant(np.ascontiguousarray(table[:, :-1].T), table[:, -1], inner)]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Oracle = Callable[[Floats], Floats]  # directions (k, n) -> a maximiser for each, (k, n)
-_EVEN = 0.05  # smallest singular value of the support points at which the axes are good enough
+_EVEN = 0.05  # smallest spread of the support points at which the axes are good enough
 
 
 def unit_frame(oracle: Oracle, centre: Floats) -> Floats:
@@ -20,11 +20,20 @@ def unit_frame(oracle: Oracle, centre: Floats) -> Floats:
     for _ in range(3):
         axes = np.linalg.inv(frame)
         points = (oracle(np.vstack([axes, -axes])) - centre) @ axes.T
-        _, sizes, principal = np.linalg.svd(points - points.mean(axis=0))
-        if sizes[-1] > _EVEN:
+        spread, principal = principal_axes(points)
+        if spread[-1] > _EVEN:
             break
         frame = _scaled(oracle, frame @ principal.T)
     return frame
+
+
+def principal_axes(points: Floats) -> tuple[Floats, Floats]:
+    """Spread (n,) of points (k, n) along orthonormal axes (n, n), the rows; widest first, zero beyond the rank."""
+    offsets = points - points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(np.linalg.qr(offsets, mode="r"))
+    spread = np.zeros(points.shape[1])
+    spread[: sizes.size] = sizes
+    return spread, np.asarray(axes, dtype=np.float64)
 
 
 def _scaled(oracle: Oracle, frame: Floats) -> Floats:

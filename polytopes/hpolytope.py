@@ -276,7 +276,10 @@ class HPolytope(Rows):
         return type(self)(*combinations.affine_image(self, matrix, shift))
 
     def minkowski_sum(self, Q: Rows) -> Self:
-        """``{x + y : x in P, y in Q}``, exact: a projection from 2 n coordinates (see `project`)."""
+        """``{x + y : x in P, y in Q}``, exact.
+
+        Fourier-Motzkin from 2 n coordinates while that is cheap, then the hull of all sums of vertices (bounded sets).
+        """
         return type(self)(*combinations.minkowski_sum(self, _same_space(self, Q)))
 
     def pontryagin_difference(self, Q: Rows) -> Self:
@@ -300,7 +303,7 @@ class HPolytope(Rows):
         method : {"auto", "fourier-motzkin", "convex-hull", "vertices"}
             "fourier-motzkin" works for every set and is fastest on sparse rows; "convex-hull" (a bounded shadow) costs
             by the facets of the result; "vertices" (a bounded set) by the vertices of this one.  "auto" eliminates
-            while a step forms at most 600 rows, then takes the convex hull if the shadow is bounded.
+            while a step forms at most 1000 rows, then takes the convex hull if the shadow is bounded.
         max_rows : int
             Limit on the rows that one step of Fourier-Motzkin may form.
         outer : bool

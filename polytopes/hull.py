@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes.frame import Oracle, unit_frame
-from polytopes.redundancy import irredundant
+from polytopes.frame import Oracle, principal_axes, unit_frame
+from polytopes.redundancy import facets
 from polytopes.rows import Rows
 
 Floats = NDArray[np.float64]
@@ -21,9 +21,8 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     n = V.shape[1]
     centre = V.mean(axis=0)
     offsets = V - centre
-    spread = float(np.abs(offsets).max())
-    _, sizes, axes = np.linalg.svd(offsets, full_matrices=True)
-    rank = int(np.count_nonzero(sizes > _FLAT * max(float(sizes[0]), np.finfo(float).tiny))) if spread > 0 else 0
+    sizes, axes = principal_axes(V)
+    rank = int(np.count_nonzero(sizes > _FLAT * sizes[0]))
     C = axes[rank:]
     d = C @ centre
     if rank == 0:
@@ -31,7 +30,7 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     normals = _facets(offsets @ axes[:rank].T / sizes[:rank])[:, :-1] / sizes[:rank] @ axes[:rank]
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
     hull = Rows(normals, (V @ normals.T).max(axis=0), C, d)
-    kept = hull.program.kept[irredundant(hull.program, centre)]
+    kept = facets(hull.program, centre)
     return hull.A[kept], hull.b[kept], C, d
 
 
@@ -76,7 +75,7 @@ def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
     normals = _refined_normals(scaled_oracle, n) @ axes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     hull = Rows(normals, (normals * oracle(normals)).sum(axis=1))
-    kept = hull.program.kept[irredundant(hull.program, inner)]
+    kept = facets(hull.program, inner)
     return hull.A[kept], hull.b[kept]
 
 
@@ -88,22 +87,22 @@ def _refined_normals(oracle: Oracle, n: int) -> Floats:
     points = _spanning_points(oracle, n)
     final: set[bytes] = set()
     while True:
-        facets = _facets(points)
-        fresh = facets[[facet.tobytes() not in final for facet in facets]]
-        found = oracle(fresh[:, :-1])
-        beyond = (found * fresh[:, :-1]).sum(axis=1) + fresh[:, -1] > _REACHED
+        found = _facets(points)
+        fresh = found[[facet.tobytes() not in final for facet in found]]
+        corners = oracle(fresh[:, :-1])
+        beyond = (corners * fresh[:, :-1]).sum(axis=1) + fresh[:, -1] > _REACHED
         if not beyond.any():
-            return facets[:, :-1]
+            return found[:, :-1]
         final.update(facet.tobytes() for facet in fresh[~beyond])
-        points = np.vstack([points, np.unique(found[beyond], axis=0)])
+        points = np.vstack([points, np.unique(corners[beyond], axis=0)])
 
 
 def _spanning_points(oracle: Oracle, n: int) -> Floats:
     """Support points that do not lie near a hyperplane."""
     points = oracle(np.vstack([np.eye(n), -np.eye(n)]))
     for _ in range(n):
-        _, sizes, principal = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)
-        if sizes.size == n and sizes[-1] > _REACHED**0.5:
+        spread, principal = principal_axes(points)
+        if spread[-1] > _REACHED**0.5:
             break
         points = np.vstack([points, oracle(np.vstack([principal[-1], -principal[-1]]))])
     return points

@@ -8,7 +8,7 @@ set in fewer coordinates.  Then
 - "convex-hull" refines a hull of support points; the choice for dense rows, its cost goes with the facets it finds;
 - "vertices" takes the hull of projected vertices; good only while the vertices can be listed (total dimension <= 6).
 
-"auto" eliminates as long as no step forms more than 600 rows (some 10 ms), then turns to the hull of support points if
+"auto" eliminates as long as no step forms more than 1000 rows (some 15 ms), then turns to the hull of support points if
 the shadow is bounded: measured on sets of 4 to 8 coordinates and 30 to 60 rows, see ``benchmarks/polytopes.py``.
 """
 
@@ -30,7 +30,7 @@ from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
 METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
-_CHEAP_ROWS = 600  # rows of one step; beyond, the hull of support points was faster in every measured case
+_CHEAP_ROWS = 1000  # rows of one step; beyond, the hull of support points was faster in every measured case
 
 
 def project(
@@ -111,14 +111,13 @@ def _project_body(
 
 def _project_automatically(P: Rows, k: int, inner: Floats, max_rows: int, outer: bool) -> tuple[Floats, Floats]:
     """Fourier-Motzkin as long as it stays cheap; then the hull of support points, if the shadow is bounded."""
-    axes = np.eye(k, P.dim)
-    result = maxima(P, np.vstack([axes, -axes]))
-    if result is None or not np.isfinite(result.values).all():
-        return _project_body(P, k, inner, "fourier-motzkin", max_rows, outer)
     try:
         return eliminate(P.A, P.b, list(range(k, P.dim)), inner, min(max_rows, _CHEAP_ROWS))
     except ProjectionLimitError:
-        return _project_body(P, k, inner, "convex-hull", max_rows, outer)
+        axes = np.eye(k, P.dim)
+        result = maxima(P, np.vstack([axes, -axes]))
+        bounded = result is not None and np.isfinite(result.values).all()
+        return _project_body(P, k, inner, "convex-hull" if bounded else "fourier-motzkin", max_rows, outer)
 
 
 def _shadow_points(P: Rows, directions: Floats) -> Floats:

@@ -28,7 +28,7 @@ def minimal_rows(P: Rows) -> tuple[Floats, Floats, Floats, Floats]:
         return np.zeros((1, n)), np.array([-1.0]), np.empty((0, n)), np.empty(0)
     flat = explicit(P)
     program = flat.program
-    rows = program.kept[irredundant(program, inner_point(program))]
+    rows = facets(program)
     independent = independent_rows(flat.C)
     return flat.A[rows], flat.b[rows], flat.C[independent], flat.d[independent]
 
@@ -41,44 +41,53 @@ def independent_rows(C: Floats) -> list[int]:
     return [next(j for j in range(C.shape[0]) if reduced[k, j] != 0) for k in range(rank)]
 
 
-def inner_point(program: Program) -> Floats:
-    """Free coordinates of the centre of a largest ball."""
-    return program.interior.point[program.flat.free]
-
-
-def irredundant(program: Program, inner: Floats) -> Indices:
-    """Positions (among the kept rows) of a minimal set of rows of a full-dimensional program.
+def facets(program: Program, inner: Floats | None = None) -> Indices:
+    """Numbers of the rows of A that are facets of a full-dimensional program.
 
     Parameters
     ----------
     program : Program
-    inner : array (free,)
-        A point strictly inside, in the free coordinates.
+    inner : array (free,), optional
+        A point strictly inside, in the free coordinates; the centre of a largest ball if absent.
     """
     if program.AT.size == 0:
         return np.empty(0, np.int64)
-    distinct = _distinct(program)
-    AT, b = np.ascontiguousarray(program.AT[:, distinct]), program.rhs[distinct]
-    start = np.ascontiguousarray(inner)
+    start = program.interior.point[program.flat.free] if inner is None else inner
+    return program.kept[irredundant(program.AT, program.rhs, start)]
+
+
+def irredundant(AT: Floats, b: Floats, inner: Floats) -> Indices:
+    """Numbers of a minimal set of rows; Clarkson's method, then one program per row if that left doubts.
+
+    Parameters
+    ----------
+    AT, b : arrays (n, m) and (m,)
+        Rows without zero rows, scaled to about unit norm, transposed.
+    inner : array (n,)
+        A point strictly inside.
+    """
+    tolerance = _TOLERANCE * (float(np.abs(b).max()) or 1.0)
+    chosen = _distinct(AT, b)
+    AT, b, start = np.ascontiguousarray(AT[:, chosen]), b[chosen], np.ascontiguousarray(inner)
     warm_up()
     if b.size >= _CLARKSON_FROM:
-        keep, doubtful = kernel.irredundant_clarkson(AT, b, start, _TOLERANCE * program.size)
-        chosen = np.flatnonzero(keep)
+        keep, doubtful = kernel.irredundant_clarkson(AT, b, start, tolerance)
+        kept = np.flatnonzero(keep)
         if not doubtful.any():
-            return distinct[chosen]
-        distinct, AT, b = distinct[chosen], np.ascontiguousarray(AT[:, chosen]), b[chosen]
-    keep, doubtful = kernel.irredundant_naive(AT, b, start, _TOLERANCE * program.size)
+            return chosen[kept]
+        chosen, AT, b = chosen[kept], np.ascontiguousarray(AT[:, kept]), b[kept]
+    keep, doubtful = kernel.irredundant_naive(AT, b, start, tolerance)
     for i in np.flatnonzero(doubtful):
-        keep[i] = _needed(AT, b, np.flatnonzero(keep), int(i), _TOLERANCE * program.size)
-    return distinct[np.flatnonzero(keep)]
+        keep[i] = _needed(AT, b, np.flatnonzero(keep), int(i), tolerance)
+    return chosen[np.flatnonzero(keep)]
 
 
-def _distinct(program: Program) -> Indices:
+def _distinct(AT: Floats, b: Floats) -> Indices:
     """Of rows with exactly the same scaled normal, the tightest."""
-    order = np.lexsort([program.rhs, *program.AT])
-    sorted_rows = program.AT[:, order]
+    order = np.lexsort([b, *AT])
+    table = AT[:, order]
     first = np.ones(order.size, dtype=bool)
-    first[1:] = (sorted_rows[:, 1:] != sorted_rows[:, :-1]).any(axis=0)
+    first[1:] = (table[:, 1:] != table[:, :-1]).any(axis=0)
     return np.sort(order[first])
 
 

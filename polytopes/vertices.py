@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from polytopes.affine_hull import explicit
 from polytopes.errors import UnboundedError
 from polytopes.frame import unit_frame
-from polytopes.redundancy import inner_point, irredundant
+from polytopes.redundancy import facets
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
 
@@ -37,8 +37,8 @@ def vertices(P: Rows) -> Floats:
     free = program.flat.free
     if not free:
         return program.flat.point[None].copy()
-    kept = irredundant(program, inner_point(program))
-    rows, rhs = np.ascontiguousarray(program.AT[:, kept].T), program.rhs[kept]
+    chosen = np.searchsorted(program.kept, facets(program))
+    rows, rhs = np.ascontiguousarray(program.AT[:, chosen].T), program.rhs[chosen]
     z = _interval_ends(rows, rhs) if len(free) == 1 else _vertices_in_frame(rows, rhs)
     lifted: Floats = program.flat.lift(z)
     return lifted

@@ -30,7 +30,7 @@ def test_clarkson_agrees_with_one_program_per_row(kind: str) -> None:
         start = np.ascontiguousarray(program.interior.point)
         naive, doubtful = kernel.irredundant_naive(program.AT, program.rhs, start, tolerance)
         assert not doubtful.any()
-        kept = irredundant(program, start)
+        kept = irredundant(program.AT, program.rhs, start)
         assert kept.size == np.count_nonzero(naive)
         minimal = HPolytope(P.A[program.kept[kept]], P.b[program.kept[kept]])
         assert minimal.equals(P, tol=1e-10 * program.size)
