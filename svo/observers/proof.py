@@ -136,7 +136,7 @@ class WindowCertificate:
 
 def _is_well_formed(c: WindowCertificate) -> bool:
     """Whether every array has its shape and finite numbers, and every interval its ends in order."""
-    if not (isinstance(c.n, int) and c.samples and len(c.samples) == c.last - c.first + 1):
+    if not (isinstance(c.n, int) and c.n > 0 and c.samples and len(c.samples) == c.last - c.first + 1):
         return False
     if not all(_holds(value, shape, kind, bounded) for value, shape, kind, bounded in _expected_arrays(c)):
         return False
@@ -150,8 +150,9 @@ def _is_well_formed(c: WindowCertificate) -> bool:
         *((-s.noise, s.noise) for s in c.samples),
         *((-s.slack, s.slack) for s in c.samples),
     ]
-    ordered = all(np.all(lower <= upper) for lower, upper in intervals)
-    return ordered and bool(np.all((c.owner > 0) & (c.owner < len(c.samples[0].stack))))
+    if not all(np.all(lower <= upper) for lower, upper in intervals) or any(np.isinf(s.y).any() for s in c.samples):
+        return False
+    return bool(np.all((c.owner > 0) & (c.owner < len(c.samples[0].stack))))
 
 
 def _holds(value: Any, shape: tuple[int, ...], kind: type, bounded: bool) -> bool:
@@ -374,7 +375,7 @@ def certificate_of(window: dict[str, Any], size: Sizes, arrival: ArrivalSet) -> 
         w_rows_lower=window["w_rows_lower"].copy(),
         w_rows_upper=window["w_rows_upper"].copy(),
         arrival=arrival,
-        on_arrival=_with_bounds(multiplier[: size.na], arrival.lower, arrival.upper),
+        on_arrival=_with_bounds(multiplier[: len(arrival.rows)], arrival.lower, arrival.upper),
         samples=tuple(samples),
     )
 

@@ -189,6 +189,11 @@ class WindowObserver:
         kernel.channel_factors(self.model.stack(schedule), self._owner)
         return perf_counter() - begun
 
+    @property
+    def directions(self) -> Array:
+        """Directions (nt, n) in which the arrival set and `WindowStep.set` are bounded: the axes, then the template."""
+        return self._arrays["T"].copy()
+
     # -- inside ----------------------------------------------------------------------------------
 
     @property
@@ -315,17 +320,32 @@ class WindowObserver:
                     return "falsified"
         return "consistent" if feasible else "undecided"
 
-    def _box_at(self, sample: int) -> tuple[Array, Array]:
-        if self._falsified is not None:
-            nothing = np.full(self.model.n_states, np.nan)
-            return nothing, nothing.copy()
+    def _check_current(self, sample: int) -> None:
         if sample != self._time:
             raise ValueError(
-                f"the box of sample {sample} was not read before sample {self._time}; "
+                f"the set of sample {sample} was not read before sample {self._time}; "
                 "read it right after its step, or use run(log)"
             )
+
+    def _bounds_at(self, sample: int) -> tuple[Array, Array]:
+        """Bounds of the state in the template's directions; the axes come first."""
+        self._check_current(sample)
+        if self._falsified is not None:
+            nothing = np.full(self._size.nt, np.nan)
+            return nothing, nothing.copy()
         self._solve(kernel.NEWEST)
-        return self._arrays["box_lower"].copy(), self._arrays["box_upper"].copy()
+        return self._arrays["now_lower"].copy(), self._arrays["now_upper"].copy()
+
+    def _support_at(self, sample: int, directions: Array) -> Array:
+        self._check_current(sample)
+        if self._falsified is not None:
+            return np.full(len(directions), -np.inf)
+        values = np.empty(len(directions))
+        for i, direction in enumerate(directions):
+            self._arrays["query"][:] = direction
+            self._solve(kernel.QUERY)
+            values[i] = self._arrays["answer"][0]
+        return values
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,14 +363,37 @@ class WindowStep:
 
     @property
     def box(self) -> tuple[Array, Array]:
-        """Outer bounds (lower, upper) of the state at this sample; NaN once the model is falsified."""
-        return self.observer._box_at(self.sample)
+        """Outer bounds (lower, upper), each (n,), of the state at this sample; NaN once the model is falsified."""
+        lower, upper = self.observer._bounds_at(self.sample)
+        n = self.observer.model.n_states
+        return lower[:n], upper[:n]
 
     @property
     def set(self) -> HPolytope:
-        """The box as a polytope; empty once the model is falsified."""
-        lower, upper = self.box
-        return HPolytope.empty(lower.size) if np.isnan(lower).any() else HPolytope.box(lower, upper)
+        """Outer polytope of the state in the template's directions; empty once the model is falsified."""
+        lower, upper = self.observer._bounds_at(self.sample)
+        rows = self.observer.directions
+        if np.isnan(lower).any():
+            return HPolytope.empty(rows.shape[1])
+        return HPolytope(np.vstack([rows, -rows]), np.concatenate([upper, -lower]))
+
+    def support(self, directions: ArrayLike) -> Array:
+        """Outer bounds of d'x over the states that the window allows, in any directions.
+
+        Parameters
+        ----------
+        directions : (k, n) array
+
+        Returns
+        -------
+        (k,) array
+            -inf once the model is falsified.
+        """
+        rows = np.asarray(directions, dtype=float)
+        n = self.observer.model.n_states
+        if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
+            raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {n})")
+        return self.observer._support_at(self.sample, rows)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from svo.observers.window_kernel.memory import (
     allocate,
     new_window,
 )
-from svo.observers.window_kernel.programs import ARRIVAL, CHANNELS, NEWEST, solve
+from svo.observers.window_kernel.programs import ARRIVAL, CHANNELS, NEWEST, QUERY, solve
 from svo.observers.window_kernel.sample import (
     BAD_INPUT,
     BAD_MATRIX,
@@ -49,6 +49,7 @@ __all__ = [
     "PIVOTS",
     "PIVOT_LIMIT",
     "PROGRAMS",
+    "QUERY",
     "RANK_ROSE",
     "REFACTORED",
     "SIGN_OPEN",

@@ -49,8 +49,10 @@ FLOATS = {
     # centres and half-widths of v and of the arrival state
     "vc": "Vv", "vr": "Vv", "xc": "n", "xr": "n",
     # template, arrival bounds of T x at the base, the next ones (at base + block) that wait for the slide, and the
-    # box of the newest state
-    "T": "tn", "h_lower": "t", "h_upper": "t", "new_lower": "t", "new_upper": "t", "box_lower": "n", "box_upper": "n",
+    # bounds of T x of the newest state
+    "T": "tn", "h_lower": "t", "h_upper": "t", "new_lower": "t", "new_upper": "t", "now_lower": "t", "now_upper": "t",
+    # a direction that is asked for, and the bound of the newest state in it
+    "query": "n", "answer": "1",
     # data as given, for proofs
     "stack": "SiXP", "u": "Su", "y": "Sy", "noise": "Sy", "slack": "Sy", "w_lower": "Vw", "w_upper": "Vw",
     # channels: stacked uncertainty = gain functional', what was known of s, and the two lines over s that bound p
@@ -78,9 +80,9 @@ def _lengths(size: Sizes) -> dict[str, int]:
     Z, X = size.n + V * v, size.n + size.ny
     return {
         "n": size.n, "u": size.nu, "w": size.nw, "y": size.ny, "q": size.nq, "h": size.nh, "t": size.nt, "i": size.ni,
-        "v": v, "S": S, "V": V, "Z": Z, "R": size.na + S * r, "Q": 2 * size.nt + 2 * size.n + 2 * size.nq, "X": X,
+        "v": v, "S": S, "V": V, "Z": Z, "R": size.na + S * r, "Q": 4 * size.nt + 2 * size.nq + 1, "X": X,
         "P": X - size.ny + size.nu + 1 + size.nw, "K": size.K, "L": size.K + size.n, "J": Z + size.K,
-        "2": 2, "4": 4, "8": 8,
+        "1": 1, "2": 2, "4": 4, "8": 8,
     }  # fmt: skip
 
 

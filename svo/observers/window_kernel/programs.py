@@ -21,7 +21,7 @@ from svo.observers.window_kernel.memory import (
 from svo.observers.window_kernel.short_rows import copy, fill
 from svo.observers.window_kernel.sources import SOURCES
 
-ARRIVAL, NEWEST, CHANNELS = range(3)
+ARRIVAL, NEWEST, CHANNELS, QUERY = range(4)
 
 
 @njit(error_model="numpy")
@@ -79,12 +79,20 @@ def _channel_cost(w, size, q, sign):
 
 
 @njit(error_model="numpy")
-def _newest_cost(w, size, i, sign):
-    """Objective sign x_i of the newest state; returns its value at z = 0 and the rounding."""
+def _newest_cost(w, size, direction, sign):
+    """Objective sign direction'x of the newest state; returns its value at z = 0 and the rounding."""
     s = w.clock[TIME] % (size.N + 1)
-    for j in range(w.psi.shape[1]):
-        w.cost[j] = sign * w.psi[i, j]
-    return sign * w.phi[s, i], w.err[s, i] + 2.0 * UNIT * (size.n + 8) * w.mag[s, i]
+    psi, cost = w.psi, w.cost
+    fill(cost, 0.0)
+    constant, rounding = 0.0, 0.0
+    for i in range(size.n):
+        weight = sign * direction[i]
+        if weight != 0.0:
+            constant += weight * w.phi[s, i]
+            rounding += abs(weight) * (w.err[s, i] + 2.0 * UNIT * (size.n + 8) * w.mag[s, i])
+            for j in range(psi.shape[1]):
+                cost[j] += weight * psi[i, j]
+    return constant, rounding
 
 
 @njit(error_model="numpy")
@@ -102,8 +110,8 @@ def _compile_solve(sources):
         """The programs of a task, from number `start` on: two a direction, upper bound first.
 
         ARRIVAL decides emptiness and, once the window is full, bounds the state at base + block; NEWEST bounds the
-        newest state; CHANNELS tightens the bounds of s that leave its sign open. Returns (verdict, program that found
-        the window empty or -1).
+        newest state in the template's directions, QUERY in the one that was asked for; CHANNELS tightens the bounds
+        of s that leave its sign open. Returns (verdict, program that found the window empty or -1).
         """
         sources  # noqa: B018 - in the closure, so part of the cache's key
         base, time = w.clock[BASE], w.clock[TIME]
@@ -111,9 +119,11 @@ def _compile_solve(sources):
         verdict = UNDECIDED
         first, count = 0, 2 * size.nt if full else 1
         if task == NEWEST:
-            first, count = 2 * size.nt, 2 * size.n
+            first, count = 2 * size.nt, 2 * size.nt
         elif task == CHANNELS:
-            first, count = 2 * size.nt + 2 * size.n, 2 * size.nq
+            first, count = 4 * size.nt, 2 * size.nq
+        elif task == QUERY:
+            first, count = 4 * size.nt + 2 * size.nq, 1
         v = time % (size.N + size.late)
         for program in range(start, count):
             i, side = program // 2, program % 2
@@ -121,7 +131,9 @@ def _compile_solve(sources):
             if task == CHANNELS and not (w.s_lower[v, i] < 0.0 < w.s_upper[v, i]):
                 continue
             if task == NEWEST:
-                constant, rounding = _newest_cost(w, size, i, sign)
+                constant, rounding = _newest_cost(w, size, w.T[i], sign)
+            elif task == QUERY:
+                constant, rounding = _newest_cost(w, size, w.query, sign)
             elif task == CHANNELS:
                 constant, rounding = _channel_cost(w, size, i, sign)
             elif time > base:
@@ -131,18 +143,20 @@ def _compile_solve(sources):
                 w.cost[0] = 1.0
                 constant, rounding = 0.0, 0.0
             outcome, value = maximise(w, size, first + program, limit)
-            if outcome == EMPTY:
-                return EMPTY_CANDIDATE, program
-            if outcome == OPTIMAL:
-                verdict = CONSISTENT
             bound = constant + value + rounding + 4.0 * UNIT * (abs(constant) + abs(value))
             if task == NEWEST:
-                _store_bound(w.box_lower, w.box_upper, i, side, bound)
+                _store_bound(w.now_lower, w.now_upper, i, side, bound)
+            elif task == QUERY:
+                w.answer[0] = bound
             elif task == CHANNELS:
                 known = w.s_upper[v, i] if side == 0 else -w.s_lower[v, i]
                 _store_bound(w.s_lower[v], w.s_upper[v], i, side, min(bound, known))
             elif full:
                 _store_bound(w.new_lower, w.new_upper, i, side, bound)
+            if outcome == EMPTY:  # its bound is stored all the same: the proof may not hold
+                return EMPTY_CANDIDATE, program
+            if outcome == OPTIMAL:
+                verdict = CONSISTENT
         if task == ARRIVAL and full:
             w.clock[PENDING] = 1
         return verdict, -1
