@@ -6,6 +6,7 @@ Each module of this folder is one benchmark with a ``main()``; it compares metho
 from __future__ import annotations
 
 import argparse
+import sys
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -22,7 +23,8 @@ def main() -> None:
     if unknown:
         parser.error(f"no benchmark {unknown[0]!r}; there are {', '.join(known)}")
     for name in names:
-        print(f"\n{name}")
+        print(f"\n{name}", flush=True)
+        sys.argv = [f"benchmarks.{name}"]  # a benchmark's own options keep their defaults
         import_module(f"benchmarks.{name}").main()
 
 
