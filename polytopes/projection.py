@@ -18,7 +18,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from polytopes.affine import affine_set
+from polytopes.affine import AffineSet, affine_set
 from polytopes.affine_hull import explicit
 from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
@@ -63,11 +63,10 @@ def project(
     P = explicit(P)
     gone = [j for j in range(n) if j not in keep]
     flat = affine_set(P.C, P.d, first=gone)
-    C, d = _equalities_left(P, keep, gone)
+    C, d = _equalities_left(flat, keep)
     rows, rhs = flat.restrict_exactly(P.A, P.b)
     free = [j for j in keep if j in flat.free]
-    A = np.zeros((0, k))
-    b = np.empty(0)
+    A, b = np.zeros((0, k)), np.empty(0)
     if free and rows.any():
         order = [flat.free.index(j) for j in free] + [q for q, j in enumerate(flat.free) if j not in free]
         some = rows.any(axis=1)
@@ -79,11 +78,10 @@ def project(
     return A, b, C, d
 
 
-def _equalities_left(P: Rows, keep: Sequence[int], gone: list[int]) -> tuple[Floats, Floats]:
-    """Equalities between the coordinates that stay."""
-    flat = affine_set(P.C, P.d, first=gone)
-    fixed = [k for k, j in enumerate(flat.pivots) if j not in gone]
-    C, d = np.zeros((len(fixed), P.dim)), np.zeros(len(fixed))
+def _equalities_left(flat: AffineSet, keep: Sequence[int]) -> tuple[Floats, Floats]:
+    """Equalities between the coordinates that stay, of a system solved for the others first."""
+    fixed = [k for k, j in enumerate(flat.pivots) if j in keep]
+    C, d = np.zeros((len(fixed), flat.dim)), np.zeros(len(fixed))
     for row, k in enumerate(fixed):
         solved = [flat.solved[k, q] for q in range(len(flat.free) + 1)]
         entries = row_to_floats([fmpq(1), *solved[:-1]], solved[-1])
