@@ -24,7 +24,12 @@ Signs = tuple[int, ...]
 
 # Exact sensors (n = 0) read a rounded value: as the observers do, leave room for that.
 ROUNDING = 1e-9
-_OPTIONS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+# Thin programs leave HiGHS undecided now and then; the next setting decides them.
+_OPTIONS = tuple(
+    {"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance, "presolve": presolve}
+    for tolerance in (1e-10, 1e-9)
+    for presolve in (True, False)
+)
 
 
 @dataclass(frozen=True)
@@ -99,19 +104,20 @@ class FullInformation:
         widened = np.outer(soft, np.eye(1, self.columns, self.columns - 1)[0])
         equal = (low == high) & (soft == 0)
         above, below = np.isfinite(high) & ~equal, np.isfinite(low) & ~equal
-        result = linprog(
-            cost,
-            A_ub=np.vstack([(matrix - widened)[above], (-matrix - widened)[below]]),
-            b_ub=np.concatenate([high[above], -low[below]]),
-            A_eq=matrix[equal],
-            b_eq=high[equal],
-            bounds=[(None, None)] * (self.columns - 1) + [(-1.0, None) if margin else (0.0, 0.0)],
-            method="highs",
-            options=_OPTIONS,
-        )
-        if result.status not in (0, 2):
-            raise AssertionError(f"the oracle's solver answered {result.status}: {result.message}")
-        return result
+        program: dict[str, Any] = {
+            "c": cost,
+            "A_ub": np.vstack([(matrix - widened)[above], (-matrix - widened)[below]]),
+            "b_ub": np.concatenate([high[above], -low[below]]),
+            "A_eq": matrix[equal],
+            "b_eq": high[equal],
+            "bounds": [(None, None)] * (self.columns - 1) + [(-1.0, None) if margin else (0.0, 0.0)],
+            "method": "highs",
+        }
+        for options in _OPTIONS:
+            result = linprog(**program, options=options)
+            if result.status in (0, 2):
+                return result
+        raise AssertionError(f"the oracle's solver answered {result.status}: {result.message}")
 
     def _add(self, row: dict[int, float], low: float, high: float, soft: float = 0.0) -> None:
         self._rows.append((row, low, high, soft))
