@@ -39,7 +39,7 @@ def delay_table(plant: Plant, summaries: Sequence[ConditionSummary]) -> TextTabl
         header += [f"{event} [s]\nmean", "\nmedian", "\n5–95 %", "\nruns"] + ["\npaper"] * bool(plant.reference)
     header += ["false\nalarms", "wrong\nisol."]
     rows = [_delay_row(plant, summary) for summary in summaries]
-    return TextTable(f"{plant.title}: {summaries[0].noise} noise", tuple(header), tuple(rows), labels=2)
+    return TextTable(f"{summaries[0].noise} noise: {plant.title}", tuple(header), tuple(rows), labels=2)
 
 
 def not_isolated(summaries: Sequence[ConditionSummary]) -> list[str]:
@@ -61,6 +61,10 @@ def counts(summaries: Sequence[ConditionSummary]) -> list[str]:
     if healthy:
         lines.append(f"fault-free runs with an alarm: {_with_bound(total(s.false_alarms for s in healthy))}")
     if faulty:
+        detected, isolated = (total(getattr(s, name).reached for s in faulty) for name in ("detect", "isolate"))
+        lines.append(
+            f"faulty runs detected: {detected.count} of {detected.of}; isolated: {isolated.count} of {isolated.of}"
+        )
         lines.append(
             f"faulty runs with an alarm before the fault: {_with_bound(total(s.false_alarms for s in faulty))}"
         )
