@@ -17,7 +17,8 @@ from polytopes.errors import ProjectionLimitError
 from polytopes.redundancy import irredundant
 
 Floats = NDArray[np.float64]
-_EPS = float(np.finfo(np.float64).eps)
+# A sum this small beside its two terms is zero: rounding errors of earlier steps would make it a row of noise.
+_CANCELLED = 64.0 * float(np.finfo(np.float64).eps)
 _LOG = logging.getLogger("polytopes")
 
 
@@ -75,8 +76,7 @@ def _combined(table: Floats, j: int) -> Floats:
     above = rows[up][:, None, :] * -column[down][None, :, None]
     below = rows[down][None, :, :] * column[up][:, None, None]
     pairs, magnitude = above + below, np.abs(above) + np.abs(below)
-    # A sum of two terms below the rounding error of those terms is zero: kept, it would be a row of noise.
-    pairs[np.abs(pairs) <= 2.0 * _EPS * magnitude] = 0.0
+    pairs[np.abs(pairs) <= _CANCELLED * magnitude] = 0.0
     return np.vstack([rows[~(up | down)], pairs.reshape(-1, rows.shape[1])])
 
 

@@ -106,6 +106,12 @@ def test_every_tampered_number_is_noticed() -> None:
     assert not Certificate({**proof.inequality, -1: fmpq(0)}, proof.equality).verify(P)
 
 
+def test_negative_multipliers_prove_nothing() -> None:
+    half_line = HPolytope([[1.0], [2.0]], [1.0, 1.0])
+    balanced = {0: fmpq(-1, 4), 1: fmpq(1, 8)}  # combines to 0 <= -1/8
+    assert not Certificate(balanced, {}).verify(half_line)
+
+
 def test_a_proof_of_one_set_does_not_hold_for_another() -> None:
     P, proof = proven_empty()
     for i in proof.inequality:

@@ -108,6 +108,21 @@ def test_the_row_limit_raises_with_numbers_or_gives_a_superset(caplog: pytest.Lo
     assert "eliminated variable 2 of 2" in caplog.text
 
 
+def test_rounding_of_earlier_steps_makes_no_rows() -> None:
+    """Rows in a space of one dimension less, products beyond 2^53: the shadow on a line is the whole line, exactly."""
+    tried = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(4, 6))
+        A = (rng.integers(-9, 10, (2 * n, n - 1)) @ rng.integers(-99, 100, (n - 1, n))).astype(float)
+        b = A @ rng.integers(-9, 10, n) + (rng.random(2 * n) < 0.2) * rng.integers(0, 5, 2 * n)
+        P = HPolytope(A, b)
+        if P.affine_dim() == n:
+            tried += 1
+            assert P.project([0], method="fourier-motzkin").equals(HPolytope.whole_space(1)), seed
+    assert tried > 15
+
+
 def test_thin_sets_keep_their_width() -> None:
     turn = np.linalg.qr(np.random.default_rng(4).standard_normal((4, 4)))[0]
     slab = HPolytope.box([0.0, -1.0, -1.0, -1.0], [1e-7, 1.0, 1.0, 1.0]).preimage(turn)
