@@ -1,0 +1,1 @@
+"""Plants: their models, simulators, faults and scenarios. They meet the studies through `svo.plant.Plant`."""

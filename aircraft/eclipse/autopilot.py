@@ -10,7 +10,7 @@ from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.noise import NoiseSet
 from aircraft.eclipse.simulator import Controller, Surrogate
 from aircraft.eclipse.trim import Trim, gust_directions, level_trim, output_matrix
-from svo.model import zero_order_hold
+from svo.discretisation import zero_order_hold
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,8 @@ from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.schedule import ScheduledBlocks
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import gust_directions, level_trim, output_matrix
-from svo.model import UncertainModel, Uncertainty, zero_order_hold
+from svo.discretisation import zero_order_hold
+from svo.model import UncertainModel, Uncertainty
 
 Array = NDArray[np.float64]
 
