@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -95,6 +94,7 @@ def study(
     with _one_line_errors():
         _need_study_extra()
         from svo.plant import load_plant
+        from svo.progress import progress
         from svo.study.configuration import StudyConfiguration
         from svo.study.publish import publish
         from svo.study.runner import run_study, warm_up
@@ -107,7 +107,7 @@ def study(
         StudyFolder(out).check(configuration, resume)
         _announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
-        with _progress("Runs") as update:
+        with progress("Runs") as update:
             folder = run_study(configuration, out, workers=workers, resume=resume, progress=update)
         _announce("Writing summary, pictures and report")
         summaries = publish(folder, the_plant)
@@ -183,6 +183,7 @@ def detect(
         from svo.detect import write_detection
         from svo.log_file import read_log
         from svo.plant import load_plant
+        from svo.progress import progress
         from svo.study.configuration import check_noise
 
         the_plant = load_plant(plant)
@@ -190,7 +191,7 @@ def detect(
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
         _announce(PREPARING)
-        with _progress("Samples") as update:
+        with progress("Samples") as update:
             found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
         if out is not None:
             write_detection(out, found)
@@ -301,44 +302,12 @@ def _describe(plant: Plant) -> dict[str, Any]:
     }
 
 
-@contextmanager
-def _progress(what: str) -> Iterator[Any]:
-    """A bar with the time left on standard error, from the first call of the function (done, of) that it gives."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    bar = Progress(*columns, console=_console(sys.stderr))
-    task = bar.add_task(what, total=None)
-
-    def update(done: int, of: int) -> None:
-        bar.start()
-        bar.update(task, completed=done, total=of)
-
-    try:
-        yield update
-    finally:
-        bar.stop()
-
-
-def _console(stream: Any) -> Console:
+def _console() -> Console:
     from rich.console import Console
 
-    console = Console(file=stream, highlight=False)
-    # A table that is cut off says less than one that a narrow window wraps.
-    return console if console.width >= 130 or console.is_terminal else Console(file=stream, highlight=False, width=130)
+    console = Console(highlight=False)
+    # A file has no width: a table in it need not be cut off.
+    return console if console.is_terminal else Console(highlight=False, width=130)
 
 
 def _announce(what: str) -> None:
@@ -352,7 +321,7 @@ def _print_json(value: Any) -> None:
 def _print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
     from svo.study import tables
 
-    console = _console(sys.stdout)
+    console = _console()
     for noise in dict.fromkeys(s.noise for s in summaries):
         chosen = [s for s in summaries if s.noise == noise]
         console.print(tables.to_rich(tables.delay_table(plant, chosen)))
