@@ -38,6 +38,9 @@ class Log:
         time = np.asarray(self.time, dtype=float)
         if time.ndim != 1:
             raise ValueError(f"time has shape {time.shape}; expected one dimension, (K,)")
+        wrong = np.flatnonzero(~(np.isfinite(time) & (np.diff(time, prepend=-np.inf) > 0)))
+        if wrong.size:
+            raise ValueError(f"time[{wrong[0]}] is {time[wrong[0]]}; expected finite, strictly increasing seconds")
         object.__setattr__(self, "time", time)
         for name in ("u", "y", "x", "schedule"):
             value = getattr(self, name)
@@ -45,7 +48,9 @@ class Log:
                 continue
             array = np.asarray(value, dtype=float)
             if array.shape[:1] != time.shape or (name != "schedule" and array.ndim != 2):
-                raise ValueError(f"{name} has shape {array.shape}; expected ({time.size}, channels), one row a sample of time")
+                raise ValueError(
+                    f"{name} has shape {array.shape}; expected ({time.size}, channels), one row a sample of time"
+                )
             object.__setattr__(self, name, array)
 
     def __len__(self) -> int:

@@ -16,10 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
 
 from polytopes import HPolytope
+from svo.checks import check_disturbance_box, check_noise, finite_array
+from svo.discretisation import discretise
 from svo.log import Log
+from svo.simulation import simulate
 
 Array = NDArray[np.float64]
 Schedulable = ArrayLike | Callable[[Any], ArrayLike] | None
@@ -48,9 +50,12 @@ class Uncertainty:
     name: str = ""
 
     def __post_init__(self) -> None:
-        lo, hi = (float(v) for v in self.bounds)
-        if not (np.isfinite(lo) and np.isfinite(hi) and lo <= hi):
-            raise ValueError(f"bounds of the uncertainty are {self.bounds}; expected finite (lower, upper) with lower <= upper")
+        ends = finite_array("bounds of the uncertainty", self.bounds)
+        if ends.shape != (2,) or ends[0] > ends[1]:
+            raise ValueError(
+                f"bounds of the uncertainty are {self.bounds}; expected (lower, upper) with lower <= upper"
+            )
+        lo, hi = (float(v) for v in ends)
         object.__setattr__(self, "bounds", (lo, hi))
 
 
@@ -104,7 +109,7 @@ class UncertainModel:
     E : (n, nw), optional
         Disturbance directions; default none.
     w : (lower, upper), a half-width vector (nw,), or an HPolytope in dimension nw
-        The disturbance set. The two bounds may each be a function of the schedule.
+        The disturbance set; needed if E or F has columns. The two bounds may each be a function of the schedule.
     D, F, a, c : (ny, nu), (ny, nw), (n,), (ny,), optional
         Feedthrough, disturbance in the output, and the affine terms.
     n : (ny,) or float, optional
@@ -115,7 +120,7 @@ class UncertainModel:
         Any of "states", "inputs", "outputs", "disturbances" to a sequence of names.
     uncertainties : sequence of Uncertainty
     schedule : optional
-        A typical scheduling value. Needed if any array is a function: shapes are checked with it.
+        A typical scheduling value. Needed if any array or bound is a function: shapes are checked with it.
 
     Raises
     ------
@@ -153,6 +158,10 @@ class UncertainModel:
         object.__setattr__(self, "_scheduled", scheduled)
         object.__setattr__(self, "_bounds", (*self._disturbance_bounds(), self._noise_bound()))
         object.__setattr__(self, "_bounds_scheduled", any(callable(b) for b in self._bounds))
+        if self._bounds_scheduled and self.schedule is None:
+            raise ValueError(
+                "schedule is missing: w or n is a function of it, so give a typical value to check shapes with"
+            )
         self.stack(self.schedule)
         self.bounds(self.schedule)
         self._check_names()
@@ -206,7 +215,9 @@ class UncertainModel:
         for entry in self._scheduled:
             value = np.asarray(entry.function(schedule), dtype=float)
             if value.shape != entry.shape:
-                raise ValueError(self._shape_message(entry.item, entry.name, value.shape) + f", at schedule {schedule!r}")
+                raise ValueError(
+                    self._shape_message(entry.item, entry.name, value.shape) + f", at schedule {schedule!r}"
+                )
             stack[entry.where] = value
         return stack
 
@@ -215,8 +226,8 @@ class UncertainModel:
         if not self._bounds_scheduled:
             return self._bounds
         lower, upper, noise = (np.asarray(b(schedule), dtype=float) if callable(b) else b for b in self._bounds)
-        _check_box(lower, upper, self.layout.nw)
-        _check_noise(noise, self.layout.ny)
+        check_disturbance_box(lower, upper, self.layout.nw)
+        check_noise(noise, self.layout.ny)
         return lower, upper, noise
 
     def block(self, name: str, schedule: Any = None, uncertainty: int | None = None) -> Array:
@@ -250,45 +261,34 @@ class UncertainModel:
         """Zero-order-hold discretisation of dx/dt = A x + B u + a + E w, inputs held over a sample.
 
         A, B, a and E are discretised exactly. The exponential of an uncertain matrix is not affine in
-        Delta, so each uncertainty keeps its first-order direction Gamma [A_i B_i a_i E_i], with Gamma =
-        int_0^Ts exp(A t) dt; ``remainder`` (n,) bounds what that leaves out, per sample, and enters as a
-        disturbance of its own. It is required when an uncertainty touches the state equation.
+        Delta, so each uncertainty keeps the directions Gamma [A_i B_i a_i E_i], Gamma = int_0^Ts exp(A t) dt,
+        as if x were held over the sample; ``remainder`` (n,) bounds what that leaves out, per sample, and
+        enters as n more disturbances. It is required when an uncertainty touches the state equation.
         """
-        A = _array("A", A)
-        n = A.shape[0]
-        if any(getattr(u, name) is not None for u in uncertainties for name in _STATE_BLOCKS) and remainder is None:
-            raise ValueError("remainder is missing: give the bound (n,) of what the first-order discretisation leaves out")
-        parts = {"B": B, "a": a, "E": E}
-        columns = [(k, np.asarray(v, dtype=float).reshape(n, -1)) for k, v in parts.items() if v is not None]
-        step = zero_order_hold(A, np.hstack([v for _, v in columns]) if columns else np.zeros((n, 0)), Ts)
-        split = np.split(step[1], np.cumsum([v.shape[1] for _, v in columns])[:-1], axis=1) if columns else []
-        out: dict[str, Any] = dict(zip([k for k, _ in columns], split, strict=True))
-        if "a" in out:
-            out["a"] = out["a"][:, 0]
-        gamma = zero_order_hold(A, np.eye(n), Ts)[1]
-        discrete = [_discretise_uncertainty(gamma, u) for u in uncertainties]
-        if remainder is not None:
-            width = np.broadcast_to(np.asarray(remainder, dtype=float), (n,))
-            w, out["E"], F, discrete = _append_disturbance(w, out.get("E"), F, discrete, width)
-        return cls(step[0], out.get("B"), C, E=out.get("E"), a=out.get("a"), w=w, F=F, Ts=Ts, uncertainties=discrete, **rest)
+        discrete = discretise(A, B, E=E, a=a, F=F, w=w, uncertainties=uncertainties, remainder=remainder, Ts=Ts)
+        return cls(C=C, Ts=Ts, **discrete, **rest)
 
     @classmethod
     def from_statespace(cls, sys: Any, *, Ts: float | None = None, **rest: Any) -> UncertainModel:
         """From an object with A, B, C, D and dt, such as a ``control.StateSpace``.
 
-        A continuous system (dt = 0) is discretised with ``Ts``; a discrete one keeps its dt.
+        A continuous system (dt = 0) is discretised with ``Ts``; a discrete one keeps its dt, or has the
+        sampling time ``Ts`` if its dt is True. One that leaves open which it is (dt = None) is refused.
         """
         D = np.asarray(sys.D, dtype=float)
-        D_or_none = D if D.any() else None
+        feedthrough = D if D.any() else None
         dt = getattr(sys, "dt", None)
-        if dt is True or dt is None or dt == 0:
-            if Ts is None:
-                raise ValueError(f"Ts is missing: the system has dt = {dt!r}, so its sampling time must be given")
-            if dt == 0:
-                return cls.from_continuous(sys.A, sys.B, sys.C, Ts=Ts, D=D_or_none, **rest)
-        elif Ts is not None and Ts != dt:
-            raise ValueError(f"Ts is {Ts} but the system is discrete with dt = {dt}; resample it, or leave Ts out")
-        return cls(sys.A, sys.B, sys.C, D=D_or_none, Ts=float(dt if Ts is None else Ts), **rest)
+        if dt is None:
+            raise ValueError("sys has dt = None; expected 0 (continuous), True or the sampling time: set sys.dt")
+        if dt is not True and dt != 0:
+            if Ts not in (None, dt):
+                raise ValueError(f"Ts is {Ts} but the system is discrete with dt = {dt}; resample it, or leave Ts out")
+            return cls(sys.A, sys.B, sys.C, D=feedthrough, Ts=float(dt), **rest)
+        if Ts is None:
+            raise ValueError(f"Ts is missing: the system has dt = {dt!r}, so its sampling time must be given")
+        if dt is True:
+            return cls(sys.A, sys.B, sys.C, D=feedthrough, Ts=Ts, **rest)
+        return cls.from_continuous(sys.A, sys.B, sys.C, Ts=Ts, D=feedthrough, **rest)
 
     # -- simulation ------------------------------------------------------------------------------
 
@@ -312,39 +312,14 @@ class UncertainModel:
         corners : bool
             Draw every w, noise and Delta at an end of its interval instead of uniformly inside.
         schedule : (K, ...) array, optional
-        """
-        inputs = np.asarray(u, dtype=float)
-        if inputs.ndim != 2 or inputs.shape[1] != self.n_inputs:
-            raise ValueError(f"u has shape {inputs.shape}; expected (samples, {self.n_inputs})")
-        x = np.asarray(x0, dtype=float)
-        if x.shape != (self.n_states,):
-            raise ValueError(f"x0 has shape {x.shape}; expected ({self.n_states},)")
-        n, states, outputs = self.n_states, [], []
-        for k, uk in enumerate(inputs):
-            value = None if schedule is None else np.asarray(schedule)[k]
-            lower, upper, noise = self.bounds(value)
-            w = self._draw_disturbance(lower, upper, rng, corners)
-            deltas = [_draw(np.array([q.bounds[0]]), np.array([q.bounds[1]]), rng, corners)[0] for q in self.uncertainties]
-            total = np.tensordot(np.array([1.0, *deltas]), self.stack(value), axes=1)
-            known = np.concatenate([x, uk, [1.0], w])
-            states.append(x)
-            outputs.append(total[n:] @ known + _draw(-noise, noise, rng, corners))
-            x = total[:n] @ known
-        return Log(
-            time=np.arange(len(inputs)) * self.Ts,
-            u=inputs,
-            y=np.array(outputs),
-            x=np.array(states),
-            schedule=None if schedule is None else np.asarray(schedule, dtype=float),
-        )
+            Scheduling value of each sample; needed if an array or a bound is a function of it.
 
-    def _draw_disturbance(self, lower: Array, upper: Array, rng: np.random.Generator, corners: bool) -> Array:
-        polytope = self.disturbance_polytope
-        if polytope is None:
-            return _draw(lower, upper, rng, corners)
-        vertices = polytope.vertices()
-        weights = np.eye(len(vertices))[rng.integers(len(vertices))] if corners else rng.dirichlet(np.ones(len(vertices)))
-        return weights @ vertices
+        Raises
+        ------
+        ValueError
+            For a wrong shape, or a schedule that is missing.
+        """
+        return simulate(self, x0, u, rng, corners=corners, schedule=schedule)
 
     # -- validation ------------------------------------------------------------------------------
 
@@ -354,9 +329,11 @@ class UncertainModel:
             return None
         if callable(value):
             if self.schedule is None:
-                raise ValueError(f"{name} is a function of the schedule, so a typical `schedule` value is needed to check shapes")
+                raise ValueError(
+                    f"schedule is missing: {name} is a function of it, so give a typical value to check shapes with"
+                )
             value = value(self.schedule)
-        return _array(name, value)
+        return finite_array(name, value)
 
     def _measure(self) -> Layout:
         A, B, C, E = (self._value(name, self) for name in "ABCE")
@@ -400,22 +377,26 @@ class UncertainModel:
         nw, w = self.layout.nw, self.w
         if w is None:
             if nw:
-                raise ValueError(f"w is missing: E or F has {nw} columns, so give (lower, upper), a half-width ({nw},) or an HPolytope")
+                raise ValueError(
+                    f"w is missing: E or F has {nw} columns; give (lower, upper), a half-width ({nw},) or an HPolytope"
+                )
             return np.zeros(0), np.zeros(0)
         if isinstance(w, HPolytope):
             if w.dim != nw:
                 raise ValueError(f"w is a polytope of dimension {w.dim}; expected {nw}, the number of columns of E")
+            if w.emptiness().status == "empty":
+                raise ValueError("w is an empty polytope; expected a bounded set with a point")
             lower, upper = w.bounding_box()
-            _check_box(lower, upper, nw)
+            check_disturbance_box(lower, upper, nw)
             return lower, upper
         if isinstance(w, tuple) and len(w) == 2:
-            lower, upper = (b if callable(b) else _array("w", b) for b in w)
+            lower, upper = (b if callable(b) else finite_array("w", b) for b in w)
         else:
-            upper = _array("w", w)
+            upper = finite_array("w", w)
             lower = -upper
         if not (callable(lower) or callable(upper)):
             lower, upper = (np.broadcast_to(b, (nw,)).copy() if b.ndim == 0 else b for b in (lower, upper))
-            _check_box(lower, upper, nw)
+            check_disturbance_box(lower, upper, nw)
         return lower, upper
 
     def _noise_bound(self) -> Any:
@@ -423,90 +404,20 @@ class UncertainModel:
             return np.zeros(self.layout.ny)
         if callable(self.n):
             return self.n
-        noise = _array("n", self.n)
+        noise = finite_array("n", self.n)
         noise = np.full(self.layout.ny, float(noise)) if noise.ndim == 0 else noise
-        _check_noise(noise, self.layout.ny)
+        check_noise(noise, self.layout.ny)
         return noise
 
     def _check_names(self) -> None:
-        sizes = {"states": self.n_states, "inputs": self.n_inputs, "outputs": self.n_outputs, "disturbances": self.n_disturbances}
+        sizes = {
+            "states": self.n_states,
+            "inputs": self.n_inputs,
+            "outputs": self.n_outputs,
+            "disturbances": self.n_disturbances,
+        }
         for key, values in (self.names or {}).items():
             if key not in sizes:
                 raise ValueError(f"names has the key {key!r}; expected any of {', '.join(sizes)}")
             if len(values) != sizes[key]:
                 raise ValueError(f"names[{key!r}] has {len(values)} entries; expected {sizes[key]}")
-
-
-def zero_order_hold(A: ArrayLike, B: ArrayLike, Ts: float) -> tuple[Array, Array]:
-    """exp(A Ts) and int_0^Ts exp(A t) dt B, from one exponential of [[A B], [0 0]]."""
-    A, B = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
-    n, m = B.shape
-    joint = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * Ts)
-    return joint[:n, :n], joint[:n, n:]
-
-
-def _array(name: str, value: Any) -> Array:
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} is not numeric: {error}") from error
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} contains NaN or Inf; expected finite numbers")
-    array.setflags(write=False)
-    return array
-
-
-def _check_box(lower: Array, upper: Array, nw: int) -> None:
-    if lower.shape != (nw,) or upper.shape != (nw,):
-        raise ValueError(f"w has bounds of shapes {lower.shape} and {upper.shape}; expected ({nw},) each, the number of columns of E")
-    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        raise ValueError("w is unbounded; expected finite bounds for every disturbance")
-    if (lower > upper).any():
-        bad = int(np.argmax(lower > upper))
-        raise ValueError(f"w[{bad}] has lower bound {lower[bad]} above its upper bound {upper[bad]}")
-
-
-def _check_noise(noise: Array, ny: int) -> None:
-    if noise.shape != (ny,):
-        raise ValueError(f"n has shape {noise.shape}; expected ({ny},), one half-width a sensor")
-    if not np.isfinite(noise).all() or (noise < 0).any():
-        raise ValueError(f"n is {noise}; expected finite half-widths >= 0")
-
-
-def _draw(lower: Array, upper: Array, rng: np.random.Generator, corners: bool) -> Array:
-    if corners:
-        return np.where(rng.random(lower.shape) < 0.5, lower, upper)
-    return rng.uniform(lower, upper)
-
-
-def _discretise_uncertainty(gamma: Array, u: Uncertainty) -> Uncertainty:
-    changed = {}
-    for name in _STATE_BLOCKS:
-        value = getattr(u, name)
-        if callable(value):
-            raise ValueError(f"{name} of an uncertainty is a function; from_continuous takes constant arrays")
-        if value is not None:
-            changed[name] = gamma @ np.asarray(value, dtype=float)
-    return replace(u, **changed)
-
-
-def _append_disturbance(
-    w: Any, E: Array | None, F: ArrayLike | None, uncertainties: list[Uncertainty], width: Array
-) -> tuple[tuple[Array, Array], Array, Array | None, list[Uncertainty]]:
-    """Add one disturbance a state, |w_new| <= width, to arrays that knew nothing of it."""
-    n = width.size
-    E = np.zeros((n, 0)) if E is None else E
-    if isinstance(w, HPolytope):
-        raise ValueError("w is a polytope; from_continuous with a remainder takes bounds or half-widths")
-    if isinstance(w, tuple):
-        lower, upper = (np.broadcast_to(np.asarray(b, dtype=float), (E.shape[1],)) for b in w)
-    else:
-        upper = np.broadcast_to(np.asarray(0.0 if w is None else w, dtype=float), (E.shape[1],))
-        lower = -upper
-    bounds = (np.concatenate([lower, -width]), np.concatenate([upper, width]))
-
-    def pad(value: Any) -> Any:
-        return None if value is None else np.hstack([value, np.zeros((len(value), n))])
-
-    wider = [replace(u, E=pad(u.E), F=pad(u.F)) for u in uncertainties]
-    return bounds, np.hstack([E, np.eye(n)]), pad(None if F is None else np.asarray(F, dtype=float)), wider

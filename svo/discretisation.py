@@ -1,0 +1,119 @@
+"""From continuous to discrete time, inputs and disturbances held over a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
+
+from polytopes import HPolytope
+from svo.checks import finite_array
+
+if TYPE_CHECKING:
+    from svo.model import Uncertainty
+
+Array = NDArray[np.float64]
+
+
+def zero_order_hold(A: ArrayLike, B: ArrayLike, Ts: float) -> tuple[Array, Array]:
+    """exp(A Ts) and int_0^Ts exp(A t) dt B, from one exponential of [[A B], [0 0]]."""
+    A, B = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
+    n, m = B.shape
+    joint = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * Ts)
+    return joint[:n, :n], joint[:n, n:]
+
+
+def discretise(
+    A: ArrayLike,
+    B: ArrayLike | None,
+    *,
+    E: ArrayLike | None,
+    a: ArrayLike | None,
+    F: ArrayLike | None,
+    w: Any,
+    uncertainties: Sequence[Uncertainty],
+    remainder: ArrayLike | None,
+    Ts: float,
+) -> dict[str, Any]:
+    """Arguments of the discrete model of dx/dt = A x + B u + a + E w; see `UncertainModel.from_continuous`.
+
+    Raises
+    ------
+    ValueError
+        Naming the array, its shape and the expected one, or the ``remainder`` that is missing.
+    """
+    A = finite_array("A", A)
+    if A.ndim != 2 or A.shape[0] != A.shape[1]:
+        raise ValueError(f"A has shape {A.shape}; expected a square matrix (n, n)")
+    n = len(A)
+    given = {name: _of_rows(name, v, n) for name, v in (("B", B), ("a", a), ("E", E)) if v is not None}
+    held = {name: zero_order_hold(A, v.reshape(n, -1), Ts)[1].reshape(v.shape) for name, v in given.items()}
+    gamma = zero_order_hold(A, np.eye(n), Ts)[1]
+    discrete = [_directions(gamma, u) for u in uncertainties]
+    out: dict[str, Any] = {"A": zero_order_hold(A, np.zeros((n, 0)), Ts)[0], "B": None, "E": None, "a": None, **held}
+    out |= {"F": F, "w": w, "uncertainties": discrete}
+    if remainder is not None:
+        return out | _with_remainder(w, out["E"], F, discrete, remainder, n)
+    if any(getattr(u, name) is not None for u in uncertainties for name in ("A", "B", "a", "E")):
+        raise ValueError(
+            f"remainder is missing: give the bound ({n},) of what the first-order discretisation leaves out"
+        )
+    return out
+
+
+def _of_rows(name: str, value: ArrayLike, n: int) -> Array:
+    array = finite_array(name, value)
+    if array.ndim != (1 if name[0] == "a" else 2) or len(array) != n:
+        raise ValueError(f"{name} has shape {array.shape}; expected ({n},{'' if name[0] == 'a' else ' columns'})")
+    return array
+
+
+def _directions(gamma: Array, u: Uncertainty) -> Uncertainty:
+    changed: dict[str, Any] = {}
+    for name in ("A", "B", "a", "E"):
+        value: Any = getattr(u, name)
+        if callable(value):
+            raise ValueError(f"{name} of an uncertainty is a function; from_continuous takes constant arrays")
+        if value is not None:
+            changed[name] = gamma @ _of_rows(f"{name} of uncertainty {u.name}".rstrip(), value, len(gamma))
+    return replace(u, **changed)
+
+
+def _with_remainder(
+    w: Any, E: Array | None, F: ArrayLike | None, uncertainties: list[Uncertainty], remainder: ArrayLike, n: int
+) -> dict[str, Any]:
+    """One more disturbance a state, |w_new| <= remainder, for arrays that knew nothing of it."""
+    width = finite_array("remainder", remainder)
+    if width.shape not in ((), (n,)) or (width < 0).any():
+        raise ValueError(f"remainder is {width} of shape {width.shape}; expected bounds >= 0 of shape ({n},)")
+    width = np.broadcast_to(width, (n,))
+    E = np.zeros((n, 0)) if E is None else E
+    lower, upper = _bounds(w, E.shape[1])
+
+    def pad(value: Any) -> Any:
+        return None if value is None else np.hstack([np.asarray(value, dtype=float), np.zeros((len(value), n))])
+
+    return {
+        "E": np.hstack([E, np.eye(n)]),
+        "F": pad(F),
+        "w": (np.concatenate([lower, -width]), np.concatenate([upper, width])),
+        "uncertainties": [replace(u, E=pad(u.E), F=pad(u.F)) for u in uncertainties],
+    }
+
+
+def _bounds(w: Any, nw: int) -> tuple[Array, Array]:
+    """Bounds of the disturbances that w gives as (lower, upper) or half-widths."""
+    if w is None and nw:
+        raise ValueError(f"w is missing: E has {nw} columns, so give (lower, upper) or a half-width ({nw},)")
+    if isinstance(w, HPolytope) or callable(w) or (isinstance(w, tuple) and any(callable(b) for b in w)):
+        raise ValueError("w is a polytope or a function; from_continuous with a remainder takes bounds or half-widths")
+    upper = finite_array("w", 0.0 if w is None else w[1] if isinstance(w, tuple) else w)
+    lower = finite_array("w", w[0]) if isinstance(w, tuple) else -upper
+    for bound in (lower, upper):
+        if bound.shape not in ((), (nw,)):
+            raise ValueError(f"w has a bound of shape {bound.shape}; expected ({nw},), the number of columns of E")
+    return np.broadcast_to(lower, (nw,)), np.broadcast_to(upper, (nw,))
