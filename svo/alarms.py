@@ -123,7 +123,9 @@ def _difference(alarm: Alarm, log: Log) -> str | None:
     """The first way in which an alarm's data are not those of the log."""
     c = alarm.certificate
     if alarm.sample != c.last or not 0 <= c.first <= c.last < len(log):
-        return f"samples {c.first} to {c.last} do not belong to alarm sample {alarm.sample} of a log of {len(log)} samples"
+        return (
+            f"samples {c.first} to {c.last} do not belong to alarm sample {alarm.sample} of a log of {len(log)} samples"
+        )
     if log.time[alarm.sample] != alarm.time:
         return f"time {alarm.time} is not that of sample {alarm.sample} in the log, {log.time[alarm.sample]}"
     for k, sample in zip(range(c.first, c.last + 1), c.samples, strict=True):
@@ -167,13 +169,14 @@ def _encode_value(value: Any) -> Any:
 
 
 def _hex(value: float) -> str:
-    return "0" if value == 0.0 else float(value).hex()
+    text = float(value).hex()
+    return "0" if text == "0x0.0p+0" else text
 
 
 def _decode(text: str) -> Alarm:
     try:
         record = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise _BadRecord(f"not JSON ({error})") from error
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise _BadRecord(f"not an alarm record of the format {FORMAT}")
@@ -187,7 +190,7 @@ def _decode(text: str) -> Alarm:
             certificate=_decode_certificate(record["certificate"]),
             source=dict(record["source"]),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise _BadRecord(f"incomplete alarm record ({type(error).__name__}: {error})") from error
 
 

@@ -140,8 +140,8 @@ def _is_well_formed(c: WindowCertificate) -> bool:
         return False
     if not all(_holds(value, shape, kind, bounded) for value, shape, kind, bounded in _expected_arrays(c)):
         return False
-    intervals = [
-        c.delta.T,
+    intervals: list[tuple[Array, Array]] = [
+        (c.delta[:, 0], c.delta[:, 1]),
         (c.w_rows_lower, c.w_rows_upper),
         (c.arrival.box_lower, c.arrival.box_upper),
         (c.arrival.lower, c.arrival.upper),
@@ -358,9 +358,7 @@ def certificate_of(window: dict[str, Any], size: Sizes, arrival: ArrivalSet) -> 
                 s_upper=window["s_upper"][v].copy(),
                 lines=window["lines"][v].copy(),
                 on_output=rows[: size.ny],
-                on_w=_with_bounds(
-                    rows[size.ny : size.ny + size.nh], window["w_rows_lower"], window["w_rows_upper"]
-                ),
+                on_w=_with_bounds(rows[size.ny : size.ny + size.nh], window["w_rows_lower"], window["w_rows_upper"]),
                 on_channel=np.maximum(on_channel, 0.0),
             )
         )
