@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import fields
 from time import perf_counter
 from typing import Any
 
@@ -16,10 +17,13 @@ from svo.observers import window_kernel as kernel
 from svo.observers.fallback import candidates, is_feasible
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
 from svo.observers.step import VerdictName
+from svo.observers.window_step import WindowRecord, WindowStep
 
 Array = NDArray[np.float64]
 _GROWING_START = 16
 _LARGEST_BASIS = 128
+_ALL = 1 << 60  # programs: more than any task has
+_PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
 _ENTRY_ERRORS = {
     kernel.BAD_INPUT: "u is {u}; expected finite numbers",
     kernel.BAD_OUTPUT: "y is {y}; expected finite numbers, or NaN for a missing sensor",
@@ -71,13 +75,7 @@ class WindowObserver:
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        self.model = model
-        self.horizon = None if horizon is None else int(horizon)
-        self.eps = float(eps)
-        self._block = 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
-        self._template = _template_rows(template, model.n_states)
-        self._owner = _channel_owners(model)
-        self._late = _output_is_disturbed(model)
+        self._configure(model, horizon, _template_rows(template, model.n_states), eps)
         self.reset(initial)
 
     # -- the protocol ----------------------------------------------------------------------------
@@ -91,13 +89,8 @@ class WindowObserver:
             If the set is empty, unbounded or of the wrong dimension.
         """
         lower, upper = _finite_box(set, self.model.n_states)
-        rows, low, high = _rows_of(set)
-        self._initial = ArrivalSet(lower, upper, rows, low, high)
-        self._allocate(_GROWING_START if self.horizon is None else self.horizon + self._block - 1)
-        self._arrays["h_lower"][: lower.size], self._arrays["h_upper"][: upper.size] = lower, upper
-        kernel.initialise(self._window, self._size, rows, low, high)
-        self._falsified: WindowCertificate | None = None
-        self._last_bounds: tuple[Array, Array] | None = None
+        steps = _GROWING_START if self.horizon is None else self.horizon + self._block - 1
+        self._begin(ArrivalSet(lower, upper, *_rows_of(set)), steps)
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> WindowStep:
         """The first measurement, without a transition.
@@ -120,7 +113,12 @@ class WindowObserver:
         return self._sample(True, np.zeros(self.model.n_inputs), inputs, y, stack, noise, (w_lower, w_upper), begun)
 
     def step(
-        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
+        self,
+        u: ArrayLike | None,
+        y: ArrayLike,
+        u_next: ArrayLike | None = None,
+        schedule: Any = None,
+        deadline: float | None = None,
     ) -> WindowStep:
         """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
 
@@ -133,6 +131,11 @@ class WindowObserver:
             u(k+1); needed only if D or a D_i is not zero.
         schedule : optional
             Scheduling value at the sample of y; it also gives the matrices of the next transition.
+        deadline : float, optional
+            Seconds after which the programs stop where they are: the arrival set is then wider but still
+            contains the state, and the verdict is "undecided" if emptiness could not be decided. What is left
+            then takes a few microseconds a direction. The exact proof of an alarm, a few milliseconds once, is
+            not cut short. Results depend on the machine's speed.
 
         Raises
         ------
@@ -151,7 +154,43 @@ class WindowObserver:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
         if self.horizon is None and self._time + 1 >= self._size.N:
             self._grow()
-        return self._sample(False, inputs, following, outputs, stack, noise, (w_lower, w_upper), begun)
+        end = None if deadline is None else begun + deadline
+        return self._sample(False, inputs, following, outputs, stack, noise, (w_lower, w_upper), begun, end)
+
+    def state_dict(self) -> dict[str, Array]:
+        """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
+        settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps])
+        first = {f"initial.{f.name}": getattr(self._initial, f.name) for f in fields(self._initial)}
+        last = dict(zip(("w_old_lower", "w_old_upper"), self._last_bounds or (), strict=False))
+        falsified = np.array(float(self._falsified is not None))
+        state = {"settings": settings, "falsified": falsified, "template": self._template, **first, **last}
+        state |= self._arrays
+        return {name: value.copy() for name, value in state.items()}
+
+    @classmethod
+    def from_state_dict(cls, model: UncertainModel, state: Mapping[str, Array]) -> WindowObserver:
+        """The observer that `state_dict` described, to continue bit for bit with the same model.
+
+        Raises
+        ------
+        ValueError
+            If the state is not that of a window observer of such a model.
+        """
+        try:
+            horizon, steps, eps = (float(v) for v in state["settings"])
+            initial = ArrivalSet(**{f.name: np.array(state[f"initial.{f.name}"]) for f in fields(ArrivalSet)})
+            observer = cls.__new__(cls)
+            observer._configure(model, None if horizon < 0 else int(horizon), state["template"], eps)
+            observer._begin(initial, int(steps))
+            for name, array in observer._arrays.items():
+                array[...] = state[name]
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"state does not belong to a window observer of this model: {error}") from error
+        if "w_old_lower" in state:
+            observer._last_bounds = (np.array(state["w_old_lower"]), np.array(state["w_old_upper"]))
+        if state["falsified"]:
+            observer._falsified = certificate_of(observer._arrays, observer._size, observer._arrival())
+        return observer
 
     def run(self, log: Log) -> WindowRecord:
         """All samples of a log, with the box of the state at each."""
@@ -203,6 +242,25 @@ class WindowObserver:
     @property
     def _started(self) -> bool:
         return bool(self._arrays["clock"][kernel.STARTED])
+
+    def _configure(self, model: UncertainModel, horizon: int | None, template: Array, eps: float) -> None:
+        self.model = model
+        self.horizon = None if horizon is None else int(horizon)
+        self.eps = float(eps)
+        self._block = 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
+        self._template = template
+        self._owner = _channel_owners(model)
+        self._late = _output_is_disturbed(model)
+
+    def _begin(self, initial: ArrivalSet, steps: int) -> None:
+        """An empty window of so many steps at most, anchored at the first states."""
+        self._initial = initial
+        self._allocate(steps)
+        n, w = self.model.n_states, self._arrays
+        w["h_lower"][:n], w["h_upper"][:n] = initial.box_lower, initial.box_upper
+        kernel.initialise(self._window, self._size, initial.rows, initial.lower, initial.upper)
+        self._falsified: WindowCertificate | None = None
+        self._last_bounds: tuple[Array, Array] | None = None
 
     def _allocate(self, steps: int) -> None:
         model, polytope = self.model, self.model.disturbance_polytope
@@ -277,6 +335,7 @@ class WindowObserver:
         noise: Array,
         w: tuple[Array, Array],
         begun: float,
+        end: float | None = None,
     ) -> WindowStep:
         w_old = self._last_bounds or w
         code = kernel.enter(self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
@@ -286,14 +345,14 @@ class WindowObserver:
             raise ValueError(_ENTRY_ERRORS[code].format(u=u, y=y))
         kernel.complete(self._window, self._size, first, self.eps)
         self._last_bounds = w
-        verdict = self._solve(kernel.ARRIVAL)
+        verdict = self._solve(kernel.ARRIVAL) if end is None else self._solve_until(end)
         return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
 
     def _solve(self, task: int) -> VerdictName:
         """Solve the programs of a task; an empty window counts only once its certificate is proven."""
         start = 0
         while True:
-            verdict, program = kernel.solve(self._window, self._size, task, start, kernel.PIVOT_LIMIT)
+            verdict, program = kernel.solve(self._window, self._size, task, start, _ALL, kernel.PIVOT_LIMIT)
             if verdict != kernel.EMPTY_CANDIDATE:
                 break
             if task == kernel.ARRIVAL and self._prove():
@@ -302,6 +361,23 @@ class WindowObserver:
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
+
+    def _solve_until(self, end: float) -> VerdictName:
+        """The arrival programs in small portions of pivots, until a time is reached."""
+        clock, decided = self._arrays["clock"], False
+        full = clock[kernel.TIME] - clock[kernel.BASE] == self._size.N
+        for program in range(2 * self._size.nt if full else 1):
+            verdict, late = kernel.UNDECIDED, False
+            while verdict == kernel.UNDECIDED and not late:
+                late = perf_counter() >= end
+                portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
+                verdict, _ = kernel.solve(self._window, self._size, kernel.ARRIVAL, program, program + 1, portion)
+            if verdict == kernel.EMPTY_CANDIDATE and self._prove():
+                return "falsified"
+            decided = decided or verdict == kernel.CONSISTENT
+        if full:
+            clock[kernel.PENDING] = 1
+        return "consistent" if decided else "undecided"
 
     def _prove(self) -> bool:
         """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
@@ -348,65 +424,6 @@ class WindowObserver:
         return values
 
 
-@dataclass(frozen=True, slots=True)
-class WindowStep:
-    """Answer of a `WindowObserver` at one sample; see `svo.observers.step.Step`.
-
-    `box` and `set` are computed when they are read, which must be before the observer's next sample.
-    """
-
-    observer: WindowObserver
-    sample: int
-    verdict: VerdictName
-    certificate: WindowCertificate | None
-    seconds: float
-
-    @property
-    def box(self) -> tuple[Array, Array]:
-        """Outer bounds (lower, upper), each (n,), of the state at this sample; NaN once the model is falsified."""
-        lower, upper = self.observer._bounds_at(self.sample)
-        n = self.observer.model.n_states
-        return lower[:n], upper[:n]
-
-    @property
-    def set(self) -> HPolytope:
-        """Outer polytope of the state in the template's directions; empty once the model is falsified."""
-        lower, upper = self.observer._bounds_at(self.sample)
-        rows = self.observer.directions
-        if np.isnan(lower).any():
-            return HPolytope.empty(rows.shape[1])
-        return HPolytope(np.vstack([rows, -rows]), np.concatenate([upper, -lower]))
-
-    def support(self, directions: ArrayLike) -> Array:
-        """Outer bounds of d'x over the states that the window allows, in any directions.
-
-        Parameters
-        ----------
-        directions : (k, n) array
-
-        Returns
-        -------
-        (k,) array
-            -inf once the model is falsified.
-        """
-        rows = np.asarray(directions, dtype=float)
-        n = self.observer.model.n_states
-        if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
-            raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {n})")
-        return self.observer._support_at(self.sample, rows)
-
-
-@dataclass(frozen=True)
-class WindowRecord:
-    """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified."""
-
-    verdicts: tuple[VerdictName, ...]
-    lower: Array
-    upper: Array
-    seconds: Array
-    certificate: WindowCertificate | None
-
-
 def _jitter(size: int) -> Array:
     """Relative changes of the cost between 0.5 and 1 in units of 1e-11, signs mixed; always the same."""
     rng = np.random.default_rng(0)
@@ -451,7 +468,9 @@ def _finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
         raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
     if P.dim != n:
         raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
+    if P.emptiness().status != "nonempty":
+        raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
     lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        raise ValueError("initial is empty or unbounded; expected a bounded nonempty set of first states")
+        raise ValueError("initial is unbounded; expected a bounded set of first states, such as a box")
     return lower, upper

@@ -76,6 +76,12 @@ def advance(w, size, k):
     for i in range(n):
         for j in range(nv):
             psi[i, first + j] += w.inputs[s, i, j]
+    t = (k + 1) % (size.N + 1)
+    for i in range(n):  # the spread over the box, which does not grow as |A|^k does
+        reach = abs(w.phi[t, i]) + w.err[t, i]
+        for j in range(psi.shape[1]):
+            reach += abs(psi[i, j])
+        w.mag[t, i] = min(w.mag[t, i], reach * (1.0 + 1e-12))
 
 
 @njit(error_model="numpy")

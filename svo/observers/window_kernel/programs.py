@@ -106,8 +106,8 @@ def _store_bound(lower, upper, i, side, bound):
 
 def _compile_solve(sources):
     @njit(cache=True, error_model="numpy")
-    def solve(w, size, task, start, limit):
-        """The programs of a task, from number `start` on: two a direction, upper bound first.
+    def solve(w, size, task, start, stop, limit):
+        """The programs of a task, numbers `start` to `stop` - 1: two a direction, upper bound first.
 
         ARRIVAL decides emptiness and, once the window is full, bounds the state at base + block; NEWEST bounds the
         newest state in the template's directions, QUERY in the one that was asked for; CHANNELS tightens the bounds
@@ -125,7 +125,7 @@ def _compile_solve(sources):
         elif task == QUERY:
             first, count = 4 * size.nt + 2 * size.nq, 1
         v = time % (size.N + size.late)
-        for program in range(start, count):
+        for program in range(start, min(stop, count)):
             i, side = program // 2, program % 2
             sign = 1.0 - 2.0 * side
             if task == CHANNELS and not (w.s_lower[v, i] < 0.0 < w.s_upper[v, i]):
@@ -157,7 +157,7 @@ def _compile_solve(sources):
                 return EMPTY_CANDIDATE, program
             if outcome == OPTIMAL:
                 verdict = CONSISTENT
-        if task == ARRIVAL and full:
+        if task == ARRIVAL and full and stop >= count:
             w.clock[PENDING] = 1
         return verdict, -1
 

@@ -10,4 +10,5 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-SOURCES = hashlib.sha256(b"".join(p.read_bytes() for p in sorted(Path(__file__).parent.glob("*.py")))).hexdigest()
+_FILES = sorted(Path(__file__).parent.glob("[!_]*.py"))  # all but the face of the package
+SOURCES = hashlib.sha256(b"".join(p.read_bytes() for p in _FILES)).hexdigest()

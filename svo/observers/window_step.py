@@ -1,0 +1,77 @@
+"""What a window observer answers: at a sample, and over a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes import HPolytope
+from svo.observers.proof import WindowCertificate
+from svo.observers.step import VerdictName
+
+if TYPE_CHECKING:
+    from svo.observers.window import WindowObserver
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class WindowStep:
+    """Answer of a `WindowObserver` at one sample; see `svo.observers.step.Step`.
+
+    `box` and `set` are computed when they are read, which must be before the observer's next sample.
+    """
+
+    observer: WindowObserver
+    sample: int
+    verdict: VerdictName
+    certificate: WindowCertificate | None
+    seconds: float
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """Outer bounds (lower, upper), each (n,), of the state at this sample; NaN once the model is falsified."""
+        lower, upper = self.observer._bounds_at(self.sample)
+        n = self.observer.model.n_states
+        return lower[:n], upper[:n]
+
+    @property
+    def set(self) -> HPolytope:
+        """Outer polytope of the state in the template's directions; empty once the model is falsified."""
+        lower, upper = self.observer._bounds_at(self.sample)
+        rows = self.observer.directions
+        if np.isnan(lower).any():
+            return HPolytope.empty(rows.shape[1])
+        return HPolytope(np.vstack([rows, -rows]), np.concatenate([upper, -lower]))
+
+    def support(self, directions: ArrayLike) -> Array:
+        """Outer bounds of d'x over the states that the window allows, in any directions.
+
+        Parameters
+        ----------
+        directions : (k, n) array
+
+        Returns
+        -------
+        (k,) array
+            -inf once the model is falsified.
+        """
+        rows = np.asarray(directions, dtype=float)
+        n = self.observer.model.n_states
+        if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
+            raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {n})")
+        return self.observer._support_at(self.sample, rows)
+
+
+@dataclass(frozen=True)
+class WindowRecord:
+    """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified."""
+
+    verdicts: tuple[VerdictName, ...]
+    lower: Array
+    upper: Array
+    seconds: Array
+    certificate: WindowCertificate | None
