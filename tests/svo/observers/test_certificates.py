@@ -313,10 +313,8 @@ def test_an_uncertainty_of_two_ranks_needs_two_channels() -> None:
 def test_an_uncertain_output_of_the_newest_sample_is_not_overlooked() -> None:
     certificate = certificate_of_jump(drift(x_row=0.1))
     assert not certificate.late
-    both = drift(x_row=0.1, y_row=2.0).stack()[1:]
-    forged = with_stacks(certificate, lambda stack: np.concatenate([stack[:1], both]))
-    for k in range(2):  # s = 2 x now
-        forged = sample_changed(forged, k, s_lower=np.array([1.0]), s_upper=np.array([3.0]))
+    stack = drift(x_row=0.1, y_row=2.0).stack()  # there s = 2 x
+    forged = sample_changed(certificate, 1, stack=stack, s_lower=np.array([1.0]), s_upper=np.array([3.0]))
     assert judge(forged) == "feasible"
     assert not forged.verify()
     assert not replace(forged, late=True).verify()
@@ -324,16 +322,25 @@ def test_an_uncertain_output_of_the_newest_sample_is_not_overlooked() -> None:
 
 def test_a_disturbed_output_of_the_newest_sample_is_not_overlooked() -> None:
     certificate = certificate_of_jump(drift())
-
-    def disturb(stack: np.ndarray) -> np.ndarray:
-        changed = stack.copy()
-        changed[0, 1, -1] = 100.0
-        return changed
-
-    forged = sample_changed(with_stacks(certificate, disturb), 1, w_lower=np.array([-0.1]), w_upper=np.array([0.1]))
+    stack = certificate.samples[1].stack.copy()
+    stack[0, 1, -1] = 100.0
+    forged = sample_changed(certificate, 1, stack=stack, w_lower=np.array([-0.1]), w_upper=np.array([0.1]))
     assert judge(forged) == "feasible"
     assert not forged.verify()
     assert not replace(forged, late=True).verify()
+
+
+def test_a_line_that_bounds_from_above_does_not_bound_from_below() -> None:
+    fixed = [Uncertainty(A=[[0.1]], bounds=(1.0, 1.0))]  # p = s, so x(1) >= 0.9 + 0.09 - 0.1, which the lines prove
+    certificate = certificate_of_jump(drift().replace(uncertainties=fixed), (1.0, 0.77))
+    above, below = certificate.samples[0].on_channel[0]
+    assert below > above
+    forged = replace(certificate, delta=np.array([[-1.0, 1.0]]))  # p = -s is possible, too
+    forged = sample_changed(
+        forged, 0, lines=np.array([[1.0, 0.0, -1.0, 0.0]]), on_channel=np.array([[above - below, 0.0]])
+    )
+    assert judge(forged) == "feasible"
+    assert not forged.verify()
 
 
 @pytest.mark.parametrize("owner", [[], [0], [2], [-1], [10**9], [1, 1], [1.0], [[1]]])
