@@ -292,6 +292,17 @@ def test_a_bound_that_explains_the_jump_ends_the_proof(changes: dict[str, Any], 
     assert not forged.verify()
 
 
+def test_rows_on_the_disturbance_take_part_in_the_proof() -> None:
+    corner = HPolytope([[-1.0, 0.0], [0.0, -1.0], [1.0, 1.0]], [0.0, 0.0, 0.1])  # each 0.1 at most, and so their sum
+    model = UncertainModel([[1.0]], None, [[1.0]], E=[[1.0, 1.0]], w=corner, n=[0.1])
+    certificate = certificate_of_jump(model, (1.0, 1.35))
+    assert np.any(certificate.samples[0].on_w)
+    assert judge(certificate) == "empty"
+    forged = replace(certificate, w_rows_upper=np.array([0.2]))
+    assert judge(forged) == "feasible"
+    assert not forged.verify()
+
+
 def with_stacks(c: WindowCertificate, change: Callable[[np.ndarray], np.ndarray]) -> WindowCertificate:
     return replace(c, samples=tuple(replace(s, stack=change(s.stack)) for s in c.samples))
 
