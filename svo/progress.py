@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from time import monotonic
 
 Update = Callable[[int, int], None]
-SECONDS_BETWEEN_LINES = 10.0
+SECONDS_BETWEEN_LINES = 10.0  # and none before 2 % are done: the first run waits for processes to start
 
 
 @contextmanager
@@ -56,7 +56,7 @@ def _lines(what: str) -> Update:
         now = monotonic()
         if before is None:
             begun, latest, before = now, now, done
-        elif now - latest >= SECONDS_BETWEEN_LINES or done == of:
+        elif done == of or (now - latest >= SECONDS_BETWEEN_LINES and 50 * (done - before) >= of - before):
             left = (now - begun) / (done - before) * (of - done)
             print(f"{what}: {done} of {of}, about {left:.0f} s left", file=sys.stderr, flush=True)
             latest = now
