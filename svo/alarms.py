@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 FORMAT = "svo-alarm-1"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Alarm:
     """A model that was falsified, and why.
 
@@ -122,16 +122,18 @@ def _check(number: int, text: str, log: Log | None) -> AlarmCheck:
 def _difference(alarm: Alarm, log: Log) -> str | None:
     """The first way in which an alarm's data are not those of the log."""
     c = alarm.certificate
-    if alarm.sample != c.last or not 0 <= c.first <= c.last < len(log):
-        return (
-            f"samples {c.first} to {c.last} do not belong to alarm sample {alarm.sample} of a log of {len(log)} samples"
-        )
+    # an observer that was started again counts its own samples
+    samples = range(alarm.sample - (c.last - c.first), alarm.sample + 1)
+    if samples[0] < 0 or alarm.sample >= len(log):
+        return f"samples {samples[0]} to {alarm.sample} do not belong to a log of {len(log)} samples"
     if log.time[alarm.sample] != alarm.time:
         return f"time {alarm.time} is not that of sample {alarm.sample} in the log, {log.time[alarm.sample]}"
-    for k, sample in zip(range(c.first, c.last + 1), c.samples, strict=True):
-        if not np.array_equal(sample.y, log.y[k], equal_nan=True):
+    for k, sample in zip(samples, c.samples, strict=True):
+        # a measurement that the observer did not use takes nothing from the proof
+        used = ~np.isnan(sample.y)
+        if used.shape != log.y[k].shape or not np.array_equal(sample.y[used], log.y[k][used]):
             return f"y of sample {k} differs from the log"
-        driven = k < c.last or bool(np.any(sample.stack[:, c.n :, c.n : c.n + sample.u.size]))
+        driven = k < alarm.sample or bool(np.any(sample.stack[:, c.n :, c.n : c.n + sample.u.size]))
         if driven and not np.array_equal(sample.u, log.u[k]):
             return f"u of sample {k} differs from the log"
     return None

@@ -30,7 +30,7 @@ _STATE_BLOCKS = ("A", "B", "a", "E")
 _OUTPUT_BLOCKS = ("C", "D", "c", "F")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Uncertainty:
     """One Delta and the directions that it scales: any of A, B, a, E (state) and C, D, c, F (output).
 
@@ -98,7 +98,7 @@ class _Scheduled(NamedTuple):
     function: Callable[[Any], ArrayLike]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UncertainModel:
     """An uncertain linear (parameter-varying) model in discrete time.
 

@@ -38,7 +38,7 @@ def _interval_min(coefficient: fmpq, lower: fmpq, upper: fmpq) -> fmpq:
     return coefficient * (lower if coefficient > 0 else upper)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ArrivalSet:
     """{x : box_lower <= x <= box_upper, lower <= rows x <= upper}: what was known of the window's first state."""
 
@@ -49,7 +49,7 @@ class ArrivalSet:
     upper: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WindowSample:
     """Model and data of one sample of a window, with the multipliers of its rows.
 
@@ -83,7 +83,7 @@ class WindowSample:
     on_channel: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WindowCertificate:
     """Proof that no x, w, noise and Delta within their bounds explain the data of a window.
 

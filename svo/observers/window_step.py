@@ -66,7 +66,7 @@ class WindowStep:
         return self.observer._support_at(self.sample, rows)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WindowRecord:
     """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified."""
 

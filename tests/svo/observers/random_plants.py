@@ -13,8 +13,8 @@ from svo.model import UncertainModel, Uncertainty
 def random_uncertainty(rng: np.random.Generator, n: int, nu: int, nw: int, ny: int) -> Uncertainty:
     """A direction of rank one or two, in the state equation, the output or both, with or without x, w and u."""
     shape = (n + ny, n + nu + 1 + nw)
-    stack = sum(rng.normal(size=(shape[0], 1)) @ rng.normal(size=(1, shape[1])) for _ in range(rng.choice([1, 1, 1, 2])))
-    stack *= 0.2
+    rank = int(rng.choice([1, 1, 1, 2]))
+    stack = 0.2 * rng.normal(size=(shape[0], rank)) @ rng.normal(size=(rank, shape[1]))
     where = rng.choice(["state", "output", "both"])
     if where == "state":
         stack[n:] = 0.0
@@ -48,7 +48,7 @@ def random_disturbance_set(rng: np.random.Generator, nw: int) -> Any:
 
 def random_plant(rng: np.random.Generator, largest: int = 4) -> UncertainModel:
     """A plant with up to `largest` states, stable or not, with shared disturbances and up to two uncertainties."""
-    n, nu, nw, ny = (int(v) for v in (rng.integers(1, largest + 1), rng.integers(0, 3), rng.integers(0, 4), rng.integers(1, 4)))
+    n, nu, nw, ny = (int(rng.integers(low, high)) for low, high in ((1, largest + 1), (0, 3), (0, 4), (1, 4)))
     A = rng.normal(size=(n, n))
     A *= rng.choice([0.5, 0.9, 1.0, 1.05]) / np.abs(np.linalg.eigvals(A)).max()
     optional: dict[str, Any] = {}
