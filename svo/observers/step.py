@@ -27,6 +27,8 @@ class Step(Protocol):
         Bounds of the current state; NaN once the model is falsified.
     set : HPolytope
         The template set of the current state; empty once the model is falsified.
+    support(directions) : (k,) array
+        Outer bounds of d'x over the current state, for directions (k, n); -inf once the model is falsified.
     """
 
     @property
@@ -43,6 +45,8 @@ class Step(Protocol):
 
     @property
     def set(self) -> HPolytope: ...
+
+    def support(self, directions: Any) -> Array: ...
 
 
 class Observer(Protocol):

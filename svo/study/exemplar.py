@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from polytopes import HPolytope
 from svo.detect import verdicts
 from svo.log import Log
+from svo.observers.step import Step
 from svo.plant import Plant
 from svo.study.configuration import Job
 
@@ -101,6 +103,25 @@ class Exemplar:
         return cls(header["fault"], header["profile"], header["noise"], names, snapshots=snapshots, **arrays)
 
 
+def planar_outline(step: Step) -> HPolytope:
+    """Outer polytope of the state whose projection on any two axes has up to 16 sides.
+
+    Directions are spread evenly over each coordinate plane, in units of the box.
+    """
+    lower, upper = step.box
+    width = np.where(upper > lower, upper - lower, 1.0)
+    angles = np.delete(np.pi * np.arange(8) / 8, [0, 4])  # the axes are the box's own
+    rows = []
+    for i, j in itertools.combinations(range(width.size), 2):
+        plane = np.zeros((angles.size, width.size))
+        plane[:, i], plane[:, j] = np.cos(angles) / width[i], np.sin(angles) / width[j]
+        rows += [plane, -plane]
+    if not rows:
+        return step.set
+    directions = np.vstack(rows)
+    return step.set.intersection(HPolytope(directions, step.support(directions)))
+
+
 def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
     """Drive a fresh bank over a log and keep what it knew at each sample."""
     if log.x is None:
@@ -118,7 +139,9 @@ def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
         if fallen and sets:
             snapshots.append(Snapshot(k - 1, f"{', '.join(fallen)} falsified next", sets))
         living = verdict.alive
-        sets = {name: verdict.steps[name].set for name in living}
+        steps = {name: verdict.steps[name] for name in living}
+        shown = log.time[k] >= plant.fault_time - plant.Ts and len(living) > 1  # what a snapshot may keep
+        sets = {name: planar_outline(step) if shown else step.set for name, step in steps.items()}
         for name in living:
             i = names.index(name)
             alive[k, i] = True
