@@ -9,6 +9,9 @@ from polytopes.rows import Rows
 
 Floats = NDArray[np.float64]
 _FLAT = 1e-12  # relative width below which points are taken to lie in a subspace
+_SLIVER = 1e-5  # relative volume and least edge of a simplex that fixes its hyperplane
+_TOUCHING = 1e-13  # distance from a hyperplane at which a point lies on it (widths are about one)
+_ALIKE = 1e-6  # distance between two rows below which they may be one facet
 _REACHED = 1e-11  # a facet is final if no point of the set lies this far beyond it (widths are about one)
 
 
@@ -27,20 +30,43 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     d = C @ centre
     if rank == 0:
         return np.empty((0, n)), np.empty(0), np.eye(n), V[0].copy()
-    normals = _facets(offsets @ axes[:rank].T / sizes[:rank])[:, :-1] / sizes[:rank] @ axes[:rank]
+    found, certain = _facets(offsets @ axes[:rank].T / sizes[:rank])
+    normals = found[:, :-1] / sizes[:rank] @ axes[:rank]
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    hull = Rows(normals, (V @ normals.T).max(axis=0), C, d)
-    kept = facets(hull.program, centre)
-    return hull.A[kept], hull.b[kept], C, d
+    A, b = _without_doubt(normals, (V @ normals.T).max(axis=0), certain, centre, axes[:rank])
+    return A, b, C, d
 
 
-def _facets(points: Floats) -> Floats:
-    """Distinct facets of the hull of full-dimensional points: outward unit normals and minus the offsets."""
-    from scipy.spatial import ConvexHull
+def _without_doubt(A: Floats, b: Floats, certain: bool, inner: Floats, axes: Floats) -> tuple[Floats, Floats]:
+    """The rows themselves if they are certainly facets, else those that linear programs confirm, within the axes."""
+    if certain:
+        return A, b
+    kept = facets(Rows(A @ axes.T, b - A @ inner).program, np.zeros(len(axes)))
+    return A[kept], b[kept]
 
-    if points.shape[1] == 1:
-        return np.array([[1.0, -points.max()], [-1.0, points.min()]])
-    return np.unique(ConvexHull(points).equations, axis=0)
+
+def _facets(points: Floats) -> tuple[Floats, bool]:
+    """Distinct facets of the hull of full-dimensional points of widths about one, and whether each surely is one.
+
+    Rows are outward unit normals and minus the offsets.  A half-space that holds all points and touches n of them that
+    do not lie near a smaller flat is a facet; no other row is the same facet if none is nearly equal.
+    """
+    from scipy.spatial import ConvexHull, cKDTree
+
+    n = points.shape[1]
+    if n == 1:
+        return np.array([[1.0, -points.max()], [-1.0, points.min()]]), True
+    hull = ConvexHull(points)
+    found, number = np.unique(hull.equations, axis=0, return_inverse=True)
+    edges = points[hull.simplices[:, 1:]] - points[hull.simplices[:, :1]]
+    lengths = np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
+    frames = np.concatenate([edges / lengths[:, :, None], hull.equations[:, None, :-1]], axis=1)
+    touching = np.abs((points[hull.simplices] @ hull.equations[:, :-1, None])[:, :, 0] + hull.equations[:, -1:])
+    good = (np.abs(np.linalg.det(frames)) > _SLIVER) & (lengths.min(axis=1) > _SLIVER)
+    good &= touching.max(axis=1) <= _TOUCHING
+    holds = (points[hull.vertices] @ found[:, :-1].T + found[:, -1]).max() <= _TOUCHING
+    touched = np.unique(number.ravel()[good]).size == len(found)
+    return found, bool(holds and touched) and not cKDTree(found).query_pairs(_ALIKE)
 
 
 def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
@@ -72,27 +98,26 @@ def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
         points: Floats = (oracle(directions @ axes) - inner) @ axes.T
         return points
 
-    normals = _refined_normals(scaled_oracle, n) @ axes
+    found, certain = _refined_normals(scaled_oracle, n)
+    normals = found @ axes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    hull = Rows(normals, (normals * oracle(normals)).sum(axis=1))
-    kept = facets(hull.program, inner)
-    return hull.A[kept], hull.b[kept]
+    return _without_doubt(normals, (normals * oracle(normals)).sum(axis=1), certain, inner, np.eye(n))
 
 
-def _refined_normals(oracle: Oracle, n: int) -> Floats:
-    """Normals of the facets of a set of widths about one.
+def _refined_normals(oracle: Oracle, n: int) -> tuple[Floats, bool]:
+    """Normals of the facets of a set of widths about one, and whether each surely is one.
 
     Each round starts Qhull afresh: its incremental mode ends the whole process on a topology error.
     """
     points = _spanning_points(oracle, n)
     final: set[bytes] = set()
     while True:
-        found = _facets(points)
+        found, certain = _facets(points)
         fresh = found[[facet.tobytes() not in final for facet in found]]
         corners = oracle(fresh[:, :-1])
         beyond = (corners * fresh[:, :-1]).sum(axis=1) + fresh[:, -1] > _REACHED
         if not beyond.any():
-            return found[:, :-1]
+            return found[:, :-1], certain
         final.update(facet.tobytes() for facet in fresh[~beyond])
         points = np.vstack([points, np.unique(corners[beyond], axis=0)])
 

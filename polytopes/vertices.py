@@ -16,6 +16,7 @@ from polytopes.support import is_bounded, known_nonempty
 
 Floats = NDArray[np.float64]
 _SAME = 1e-9  # relative distance below which two computed vertices are one
+_RANK = float(np.finfo(np.float64).eps)  # relative singular value, per row, that counts as zero
 
 
 def vertices(P: Rows) -> Floats:
@@ -61,23 +62,31 @@ def _vertices_in_frame(rows: Floats, rhs: Floats) -> Floats:
     scaled, room = scaled / lengths[:, None], room / lengths
     inner = Rows(scaled, room).program.interior.point
     hull = HalfspaceIntersection(np.hstack([scaled, -room[:, None]]), inner)
-    corners = zip(hull.dual_facets, hull.intersections, strict=True)
-    points = _merged(np.array([_corner(scaled, room, active, guess) for active, guess in corners]))
+    points = _merged(_corners(scaled, room, hull.dual_facets, hull.intersections))
     return centre + points @ frame.T
 
 
-def _corner(rows: Floats, rhs: Floats, active: list[int], guess: Floats) -> Floats:
-    """The vertex recomputed from its active rows."""
-    correction = np.linalg.lstsq(rows[active], rhs[active] - rows[active] @ guess, rcond=None)[0]
-    corrected: Floats = guess + correction
+def _corners(rows: Floats, rhs: Floats, active: list[list[int]], guesses: Floats) -> Floats:
+    """The vertices recomputed from their active rows: the least correction of each guess."""
+    corrected = guesses.copy()
+    counts = np.array([len(numbers) for numbers in active])
+    for count in np.unique(counts):
+        chosen = np.flatnonzero(counts == count)
+        numbers = np.array([active[k] for k in chosen])
+        normals = rows[numbers]
+        missed = rhs[numbers] - (normals @ guesses[chosen][:, :, None])[:, :, 0]
+        corrected[chosen] += (np.linalg.pinv(normals, rcond=_RANK * count) @ missed[:, :, None])[:, :, 0]
     return corrected
 
 
 def _merged(points: Floats) -> Floats:
     """Points without near-duplicates, in lexicographic order of their first occurrence."""
+    from scipy.spatial import cKDTree
+
+    ordered = points[np.lexsort(points.T[::-1])]
     reach = _SAME * max(1.0, float(np.abs(points).max()))
-    chosen: list[Floats] = []
-    for point in points[np.lexsort(points.T[::-1])]:
-        if not chosen or np.abs(np.array(chosen) - point).max(axis=1).min() > reach:
-            chosen.append(point)
-    return np.array(chosen)
+    keep = np.ones(len(ordered), dtype=bool)
+    for first, second in sorted(cKDTree(ordered).query_pairs(reach, p=np.inf)):
+        keep[second] &= not keep[first]
+    merged: Floats = ordered[keep]
+    return merged

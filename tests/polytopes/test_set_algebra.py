@@ -1,5 +1,7 @@
 """Sums, differences, images, hulls, reductions: on every kind of set, against the exact oracle, and by their laws."""
 
+import itertools
+
 import numpy as np
 import ppl
 import pytest
@@ -223,3 +225,17 @@ def test_hull_needs_sets_of_one_dimension() -> None:
         convex_hull([])
     with pytest.raises(ValueError, match="Q has dimension 3"):
         convex_hull([HPolytope.empty(2), HPolytope.empty(3)])
+
+
+def test_hulls_have_one_row_per_facet_with_and_without_doubt() -> None:
+    """Points in general position, integer ones with many on a facet, and slivers 1e-9 beside a facet."""
+    rng = np.random.default_rng(4)
+    sphere = rng.standard_normal((60, 4))
+    grid = np.array(list(itertools.product([0.0, 1.0, 2.0], repeat=4)))
+    bump = np.vstack([np.array(list(itertools.product([0.0, 1.0], repeat=3))), [[0.5, 0.5, 1.0 + 1e-9]]])
+    for points, facets in ((sphere, None), (grid, 8), (grid @ rng.integers(-3, 4, (4, 4)), 8), (bump, 9)):
+        hull = HPolytope.from_vertices(points)
+        assert hull.contains(points, tol=1e-13).all()
+        assert hull.b.size == hull.remove_redundancy().b.size
+        assert facets is None or hull.b.size == facets
+        assert hull.equals(HPolytope.from_vertices(hull.vertices()), tol=1e-11)

@@ -119,3 +119,18 @@ def test_scaling_is_by_powers_of_two_only() -> None:
     np.testing.assert_array_equal(program.AT.T / program.scale[:, None], A)
     assert (program.norms >= 0.5).all()
     assert (program.norms < 1.0).all()
+
+
+def test_near_ties_do_not_displace_a_vertex() -> None:
+    """Rows that meet within the Harris tolerance (1e-11) of a point: the optimum satisfies them to rounding."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        A = rng.standard_normal((30, 4))
+        A /= np.linalg.norm(A, axis=1)[:, None]
+        A *= np.sign(A @ [1.0, 1.0, 1.0, 1.0])[:, None]
+        b = A @ [0.3, -0.2, 0.1, 0.4] + rng.uniform(0.0, 5e-12, 30)
+        P = HPolytope(A, b).intersection(HPolytope.box([-1.0] * 4, [1.0] * 4))
+        result = P.support_points(np.vstack([A[:5], rng.standard_normal((5, 4))]))
+        assert (result.points @ P.A.T - P.b).max() <= 1e-13
+        np.testing.assert_allclose(result.multipliers @ P.b, result.values, rtol=0.0, atol=1e-13)
+        assert (result.multipliers >= -1e-13).all()
