@@ -6,7 +6,7 @@
        ^              v            v
        +-------- unexplained <-----+             every model is falsified
 
-(Rosa and Silvestre 2013, section 4.2, Architecture I, with the debounce of Remark 5.)
+(Rosa and Silvestre 2013, section 4.1, Architecture I, with the debounce of Remark 5.)
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class IsolationLogic:
 
     def initial(self) -> LogicState:
         """Every model alive."""
-        return LogicState("nominal", self.names, self.names, tallies=(Tally(),) * len(self.names))
+        return LogicState("nominal", self.names, self._to_run(self.names), tallies=(Tally(),) * len(self._counted))
 
     def advance(
         self, before: LogicState, sample: int, falsified: Collection[str], undecided: Collection[str] = ()
@@ -102,7 +102,8 @@ class IsolationLogic:
         if not falsified and before.settled:
             return before
         tallies = self._count(before, falsified, undecided)
-        after = self._conclude(replace(before, tallies=tallies, restart=()), sample, falsified)
+        after = self._conclude(replace(before, tallies=tallies), sample, falsified)
+        after = replace(after, restart=self._to_restart(before, after, falsified))
         return replace(after, settled=self._is_settled(after))
 
     def give_up(self, before: LogicState, sample: int) -> LogicState:
@@ -112,72 +113,75 @@ class IsolationLogic:
             detected_at=sample if before.detected_at is None else before.detected_at, settled=True,
         )  # fmt: skip
 
+    # -- which observers ---------------------------------------------------------------------------
+
+    @property
+    def _counted(self) -> tuple[str, ...]:
+        """Observers that have a tally."""
+        return self.names
+
+    def _to_run(self, alive: tuple[str, ...]) -> tuple[str, ...]:
+        """Observers to step while these models are alive: they, and those on trial."""
+        if NOMINAL in alive or self.recovery is None:
+            return alive
+        return (NOMINAL, *alive) if alive else self.names
+
+    def _to_restart(self, before: LogicState, after: LogicState, falsified: Collection[str]) -> tuple[str, ...]:
+        """Whoever runs next and fell just now, or did not run."""
+        return tuple(n for n in after.running if n in falsified or n not in before.running)
+
     # -- one sample --------------------------------------------------------------------------------
 
     def _count(self, before: LogicState, falsified: Collection[str], undecided: Collection[str]) -> tuple[Tally, ...]:
         tallies = []
-        for name, tally in zip(self.names, before.tallies, strict=True):
+        for name, tally in zip(self._counted, before.tallies, strict=True):
             if name in falsified:
                 tally = Tally(tally.falsified + 1, 0)
             elif self._counts(tally) and name in before.running and name not in undecided:
                 tally = Tally(tally.falsified, tally.consistent + 1)
-                if name in before.alive and self._has_recovered(tally):
+                if self._has_recovered(tally) and (name in before.alive or name not in self.names):
                     tally = Tally()
             tallies.append(tally)
         return tuple(tallies)
 
     def _conclude(self, state: LogicState, sample: int, falsified: Collection[str]) -> LogicState:
-        tally = dict(zip(self.names, state.tallies, strict=True))
-        recovered = tuple(n for n in state.running if n not in state.alive and self._has_recovered(tally[n]))
+        tally = dict(zip(self._counted, state.tallies, strict=True))
+        on_trial = [n for n in self.names if n in state.running and n not in state.alive]
+        recovered = tuple(n for n in on_trial if self._has_recovered(tally[n]))
         if NOMINAL in recovered:
-            return self._all_clear(state, falsified)
+            return self.initial()
         if state.state == "unexplained":
-            if not recovered:
-                return replace(state, restart=tuple(n for n in state.running if n in falsified))
-            after = self._declare(self._afresh(state, recovered), sample, recovered)
-        else:
-            alive = tuple(n for n in state.alive if n not in falsified or tally[n].falsified < self.debounce)
-            if not alive:
-                return self._unexplained(state, sample, falsified)
-            after = self._declare(state, sample, alive)
-        if after.state == "detected" and self._is_late(after, sample):
-            return self._all_clear(after, falsified)
-        return replace(after, restart=tuple(n for n in after.running if n in falsified))
+            return self._declare(self._afresh(state, recovered), sample, recovered) if recovered else state
+        alive = tuple(n for n in state.alive if n not in falsified or tally[n].falsified < self.debounce)
+        if not alive:
+            return self._unexplained(state, sample)
+        after = self._declare(state, sample, alive)
+        return self.initial() if after.state == "detected" and self._is_late(after, sample) else after
 
     def _declare(self, state: LogicState, sample: int, alive: tuple[str, ...]) -> LogicState:
         """The state that follows from the models that are left."""
+        running = self._to_run(alive)
         if NOMINAL in alive:
-            return replace(state, state="nominal", alive=alive, running=alive)
-        on_trial = (NOMINAL,) if self.recovery is not None else ()
+            return replace(state, state="nominal", alive=alive, running=running)
         detected_at = sample if state.detected_at is None else state.detected_at
         isolated = len(alive) == 1
         return replace(
             state,
             state="isolated" if isolated else "detected",
             alive=alive,
-            running=on_trial + alive,
+            running=running,
             fault=alive[0] if isolated else None,
             detected_at=detected_at,
             isolated_at=(sample if state.isolated_at is None else state.isolated_at) if isolated else None,
         )
 
-    def _unexplained(self, state: LogicState, sample: int, falsified: Collection[str]) -> LogicState:
-        none_left = self.give_up(state, sample)
-        if self.recovery is None:
-            return none_left
-        return replace(none_left, running=self.names, restart=self._to_restart(state, falsified))
+    def _unexplained(self, state: LogicState, sample: int) -> LogicState:
+        return replace(self.give_up(state, sample), running=self._to_run(()))
 
     def _afresh(self, state: LogicState, recovered: tuple[str, ...]) -> LogicState:
         """A new diagnosis by the models that passed their trial."""
-        tallies = zip(self.names, state.tallies, strict=True)
+        tallies = zip(self._counted, state.tallies, strict=True)
         return replace(state, detected_at=None, tallies=tuple(Tally() if n in recovered else t for n, t in tallies))
-
-    def _all_clear(self, state: LogicState, falsified: Collection[str]) -> LogicState:
-        """All models alive; those that were not running, or fell just now, start again."""
-        return replace(self.initial(), restart=self._to_restart(state, falsified))
-
-    def _to_restart(self, state: LogicState, falsified: Collection[str]) -> tuple[str, ...]:
-        return tuple(n for n in self.names if n not in state.running or n in falsified)
 
     def _has_recovered(self, tally: Tally) -> bool:
         return self.recovery is not None and tally.falsified > 0 and tally.consistent >= self.recovery
