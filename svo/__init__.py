@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from svo.isolation.architectures import ArchitectureI
+    from svo.isolation.architectures import ArchitectureI, ArchitectureII
     from svo.isolation.record import BankRecord, Verdict
     from svo.log import Log
     from svo.model import UncertainModel, Uncertainty
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArchitectureI",
+    "ArchitectureII",
     "BankRecord",
     "Log",
     "UncertainModel",
@@ -26,6 +27,7 @@ __all__ = [
 
 _HOMES = {
     "ArchitectureI": "svo.isolation.architectures",
+    "ArchitectureII": "svo.isolation.architectures",
     "BankRecord": "svo.isolation.record",
     "Log": "svo.log",
     "UncertainModel": "svo.model",

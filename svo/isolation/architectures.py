@@ -1,35 +1,23 @@
-"""Banks of observers that detect and isolate faults (Rosa and Silvestre 2013, section 4.2 and Figure 6)."""
+"""Banks of observers that detect and isolate faults (Rosa and Silvestre 2013, sections 4.1, 4.2 and Figure 6)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Collection, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.isolation.logic import NOMINAL, IsolationLogic, LogicState
-from svo.isolation.record import BankRecord, Recorder, Verdict
-from svo.log import Log
+from svo.isolation.bank import Bank, Sample, by_name, check_counts, falsified_and_undecided
+from svo.isolation.global_logic import GlobalLogic
+from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.observers.step import Observer, Step
 
 Array = NDArray[np.float64]
 Box = tuple[Array, Array]
 
 
-@dataclass(frozen=True, slots=True)
-class _Sample:
-    """The arguments of a bank's step, kept for observers that have to repeat it."""
-
-    u: ArrayLike | None
-    u_next: ArrayLike | None
-    schedule: Any
-
-
-class ArchitectureI:
+class ArchitectureI(Bank):
     """A nominal observer and one observer a fault, all running from the start.
 
     Every fault model must contain the nominal plant. A fault is detected when the nominal model is
@@ -74,173 +62,164 @@ class ArchitectureI:
         recovery: int | None = None,
         timeout: int | None = None,
     ) -> None:
-        _check_names(faults)
-        _check_count("debounce", debounce)
-        _check_count("recovery", recovery, optional=True)
-        _check_count("timeout", timeout, optional=True)
-        observers = {NOMINAL: nominal, **faults}
-        self.names = tuple(observers)
-        self.observers: Mapping[str, Observer] = MappingProxyType(observers)
-        self._logic = IsolationLogic(self.names, debounce, recovery, timeout)
-        _check_observers(observers, self._logic.may_restart)
-        self._forget()
-
-    # -- samples -----------------------------------------------------------------------------------
-
-    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Verdict:
-        """The first measurement, without a transition; ``u`` is needed only if D or a D_i is not zero.
-
-        Raises
-        ------
-        ValueError
-            If the bank has already started.
-        """
-        if self._sample is not None:
-            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        steps = {name: observer.update(y0, u=u, schedule=schedule) for name, observer in self._running.items()}
-        return self._conclude(0, steps, _Sample(None, u, schedule))
-
-    def step(
-        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
-    ) -> Verdict:
-        """One transition driven by u, then the measurement y; arguments as for the observers.
-
-        Raises
-        ------
-        ValueError
-            If there was no first measurement, or an observer refuses the arguments.
-        """
-        if self._sample is None:
-            raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
-        steps = {n: o.step(u, y, u_next=u_next, schedule=schedule) for n, o in self._running.items()}
-        return self._conclude(self._sample + 1, steps, _Sample(u, u_next, schedule))
-
-    def reset(self, set: HPolytope) -> None:
-        """Forget everything; all models are alive and the state at the next measurement lies in ``set``."""
-        for observer in self.observers.values():
-            observer.reset(set)
-        self._forget()
-
-    def warm_up(self) -> float:
-        """Compile whatever the observers' steps need; returns the seconds that it took."""
-        return sum(observer.warm_up() for observer in self.observers.values())
-
-    def run(self, log: Log) -> BankRecord:
-        """All samples of a log, with its own schedule.
-
-        Raises
-        ------
-        ValueError
-            If the bank has already started, or the log is empty or has other channels than the models.
-        """
-        self._check_log(log)
-        recorder = Recorder(self.names, len(log))
-        recorder.add(self.update(log.y[0], u=log.u[0], schedule=log.schedule_at(0)))
-        for k in range(1, len(log)):
-            recorder.add(self.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=log.schedule_at(k)))
-        return recorder.record()
-
-    # -- inside ------------------------------------------------------------------------------------
+        check_counts(debounce, recovery, timeout)
+        observers = by_name(nominal, faults, reserved=(NOMINAL,))
+        logic = IsolationLogic(tuple(observers), debounce, recovery, timeout)
+        super().__init__(logic, observers, same_states=logic.may_restart)
 
     def _forget(self) -> None:
-        self._sample: int | None = None
+        super()._forget()
         self._hull: Box | None = None
-        self._latest = _Sample(None, None, None)
-        self._adopt(self._logic.initial())
 
-    def _adopt(self, state: LogicState) -> None:
-        self._state = state
-        self._running = {name: self.observers[name] for name in state.running}
-
-    def _conclude(self, k: int, steps: dict[str, Step], now: _Sample) -> Verdict:
-        falsified: list[str] = []
-        undecided: list[str] = []
-        for name, step in steps.items():
-            if step.verdict != "consistent":
-                (falsified if _is_proved(name, step) else undecided).append(name)
-        before, state = self._state, self._logic.advance(self._state, k, falsified, undecided)
-        if self._logic.may_restart:
-            survivors = [step.box for name, step in steps.items() if name not in falsified]
-            state = self._begin_again(state, k, survivors, now)
-        if state is not before:
-            self._adopt(state)
-        self._sample, self._latest = k, now
-        return Verdict(k, state.state, state.fault, state.alive, state.detected_at, state.isolated_at, steps)
-
-    def _begin_again(self, state: LogicState, k: int, survivors: list[Box], now: _Sample) -> LogicState:
+    def _begin_again(
+        self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
+    ) -> LogicState:
         """Initialise the observers that the logic asks for, and keep the hull of this sample's boxes."""
+        if not self._logic.may_restart:
+            return state
+        survivors = [step.box for name, step in steps.items() if name not in falsified]
         if survivors:
             self._hull = _hull(survivors)
             for name in state.restart:
-                self._start_from(name, self._hull, now)
+                self._start_from(name, HPolytope.box(*self._hull), now)
         elif self._hull is None:
             return self._logic.give_up(state, k)
         elif state.restart:
-            self._hull = _hull([self._predict_from(name, self._hull, now) for name in state.restart])
+            before = HPolytope.box(*self._hull)
+            self._hull = _hull([self._predict_from(name, before, now).box for name in state.restart])
         return state
 
-    def _start_from(self, name: str, box: Box, at: _Sample) -> None:
-        observer = self.observers[name]
-        observer.reset(HPolytope.box(*box))
-        # The survivors' sets have seen the measurement; this only tells the observer its schedule.
-        observer.update(self._nothing(), u=at.u_next, schedule=at.schedule)
 
-    def _predict_from(self, name: str, box: Box, now: _Sample) -> Box:
-        """Start from the sample before, leaving out the measurement that nothing explains."""
-        self._start_from(name, box, self._latest)
-        return self.observers[name].step(now.u, self._nothing(), u_next=now.u_next, schedule=now.schedule).box
+class ArchitectureII(Bank):
+    """A nominal and a global observer, and fault observers that start from the global set when there is a fault.
 
-    def _nothing(self) -> Array:
-        return np.full(self.observers[NOMINAL].model.n_outputs, np.nan)
+    The nominal observer detects; once it is declared falsified, the observers of class II start from the
+    global set with the measurement of that sample, so that their models need not contain the nominal plant.
+    Those of class I, which contain it, run from the start. A fault is isolated when exactly one fault model
+    is left. An observer that is declared falsified is no longer stepped.
 
-    def _check_log(self, log: Log) -> None:
-        if self._sample is not None:
-            raise ValueError("run was called on a bank that has already started; call reset(set), or use a fresh bank")
-        model = self.observers[NOMINAL].model
-        if len(log) == 0:
-            raise ValueError("log has no samples; expected at least one")
-        for name, wanted in (("u", model.n_inputs), ("y", model.n_outputs)):
-            shape = getattr(log, name).shape
-            if shape[1] != wanted:
-                raise ValueError(f"log.{name} has shape {shape}; expected (samples, {wanted}), as the models have")
+    Parameters
+    ----------
+    nominal : Observer
+    faults : mapping of str to Observer
+        One observer a fault, by the fault's name; no observer may stand twice in the bank. The sets that
+        the observers of class II were built with are not used.
+    global_ : Observer or HPolytope
+        Its set contains the state whether the plant is healthy or has any of the faults: an observer of a
+        model that contains all the others, or a bounded set that the state never leaves. The observer runs
+        from the start; its answers are ``Verdict.steps["global"]``. When it is declared falsified, no model
+        explains the data, and the bank is "unexplained".
+    class_one : sequence of str
+        Faults whose models contain the nominal plant.
+    debounce : int
+        Certified falsifications, each after a new initialisation from the global set, that declare a model
+        falsified (the paper's Remark 5). The global observer's own count too; it starts again from its set
+        at the sample before, moved on without the measurement that falsified it.
+    recovery : int, optional
+        Consistent samples, since its start from the global set, after which a falsified nominal model is
+        believed again: the fault is over and all models are alive and start from the global set. Also
+        the consistent samples after which falsifications short of the debounce are forgotten, and the trial
+        of every model after "unexplained". By default a declared falsification is final.
+    timeout : int, optional
+        Samples from detection without isolation after which all models are alive again and start from the
+        global set.
 
+    Notes
+    -----
+    The bank never rules out the true fault if the plant keeps to a model of the bank: the global one
+    always, the nominal one until the fault begins, and the fault's own from then on. Recovery and timeout
+    assume that a fault that is still there falsifies the nominal model within so many samples.
 
-def _is_proved(name: str, step: Step) -> bool:
-    if step.verdict == "falsified" and step.certificate is None:
-        raise ValueError(f"observer {name!r} answered 'falsified' without a certificate; expected one, or 'undecided'")
-    return step.verdict == "falsified"
+    Raises
+    ------
+    ValueError
+        For a bad or missing name, an observer used twice, observers whose models differ in inputs, outputs,
+        states or sampling time, a global set that is empty, unbounded or of the wrong dimension, or a count
+        below one.
+    """
+
+    def __init__(
+        self,
+        nominal: Observer,
+        faults: Mapping[str, Observer],
+        global_: Observer | HPolytope,
+        class_one: Collection[str] = (),
+        debounce: int = 1,
+        recovery: int | None = None,
+        timeout: int | None = None,
+    ) -> None:
+        check_counts(debounce, recovery, timeout)
+        observers = by_name(nominal, faults, reserved=(NOMINAL, GLOBAL))
+        names = tuple(observers)
+        _check_class_one(class_one, faults)
+        self._constant: HPolytope | None = None
+        if isinstance(global_, HPolytope):
+            self._constant = _checked_set(global_, nominal.model.n_states)
+        else:
+            observers[GLOBAL] = global_
+        class_two = tuple(name for name in faults if name not in class_one)
+        logic = GlobalLogic(names, debounce, recovery, timeout, class_two, observed=self._constant is None)
+        super().__init__(logic, observers, same_states=True)
+
+    def _forget(self) -> None:
+        super()._forget()
+        self._global_set = self._constant
+
+    def _begin_again(
+        self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
+    ) -> LogicState:
+        """Start the observers that the logic asks for from the global set of this sample."""
+        if GLOBAL in falsified and self._global_set is None:
+            return self._logic.give_up(state, k)
+        self._keep_global_set(state, steps, falsified, now)
+        while state.restart:
+            fallen = self._start(state, steps, now)
+            if not fallen:
+                break
+            # The others have no new answer at this sample.
+            state = self._logic.advance(state, k, fallen, undecided=(*self.names, GLOBAL))
+        return state
+
+    def _keep_global_set(
+        self, state: LogicState, steps: dict[str, Step], falsified: Collection[str], now: Sample
+    ) -> None:
+        if GLOBAL in state.restart:
+            assert self._global_set is not None
+            self._global_set = self._predict_from(GLOBAL, self._global_set, now).set
+        elif GLOBAL in steps and GLOBAL not in falsified and (state.restart or self._logic.may_restart):
+            self._global_set = steps[GLOBAL].set
+
+    def _start(self, state: LogicState, steps: dict[str, Step], now: Sample) -> list[str]:
+        """Start observers, keep the answers of those that did not fall, and say which fell at once."""
+        assert self._global_set is not None
+        started: dict[str, Step] = {}
+        for name in state.restart:
+            if name == GLOBAL:
+                continue
+            # The measurement that falsified an observer is left out: it may be an outlier.
+            measures = name not in steps and state.state in ("detected", "isolated")
+            step = self._start_from(name, self._global_set, now, now.y if measures else None)
+            if name not in steps or steps[name].verdict != "falsified":
+                started[name] = step
+        steps |= started
+        return falsified_and_undecided(started)[0]
 
 
 def _hull(boxes: list[Box]) -> Box:
     return np.min([lower for lower, _ in boxes], axis=0), np.max([upper for _, upper in boxes], axis=0)
 
 
-def _check_names(faults: Mapping[str, Observer]) -> None:
-    if not isinstance(faults, Mapping):
-        raise TypeError(f"faults is a {type(faults).__name__}; expected a mapping of fault names to observers")
-    if not faults:
-        raise ValueError("faults is empty; expected at least one fault observer (to detect only, run one observer)")
-    for name in faults:
-        if not isinstance(name, str) or not name.strip() or name == NOMINAL:
-            raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {NOMINAL!r}")
+def _check_class_one(class_one: Collection[str], faults: Mapping[str, Observer]) -> None:
+    if isinstance(class_one, str):
+        raise TypeError(f"class_one is the string {class_one!r}; expected a sequence of fault names, such as a tuple")
+    for name in class_one:
+        if name not in faults:
+            raise ValueError(f"class_one has the name {name!r}; expected names among the faults: {', '.join(faults)}")
 
 
-def _check_count(name: str, value: int | None, optional: bool = False) -> None:
-    if value is None and optional:
-        return
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1{', or None' if optional else ''}")
-
-
-def _check_observers(observers: Mapping[str, Observer], same_states: bool) -> None:
-    owners: dict[int, str] = {}
-    for name, observer in observers.items():
-        if id(observer) in owners:
-            raise ValueError(f"{name!r} and {owners[id(observer)]!r} are the same observer; give each name its own")
-        owners[id(observer)] = name
-    nominal = observers[NOMINAL].model
-    for name, observer in observers.items():
-        for attribute in ("n_inputs", "n_outputs", "Ts", *(("n_states",) if same_states else ())):
-            found, wanted = getattr(observer.model, attribute), getattr(nominal, attribute)
-            if found != wanted:
-                raise ValueError(f"the model of {name!r} has {attribute} = {found}; expected {wanted}, as nominal has")
+def _checked_set(set: HPolytope, n_states: int) -> HPolytope:
+    if set.dim != n_states:
+        raise ValueError(f"global_ has dimension {set.dim}; expected {n_states}, the number of states")
+    if set.emptiness().status != "nonempty" or not set.is_bounded():
+        raise ValueError("global_ is empty or unbounded; expected a bounded set that the state never leaves")
+    return set

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 NOMINAL = "nominal"
+GLOBAL = "global"
 
 BankState = Literal["nominal", "detected", "isolated", "unexplained"]
 

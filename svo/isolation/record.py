@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.isolation.logic import BankState
+from svo.isolation.logic import GLOBAL, BankState
 from svo.observers.step import Step
 
 
@@ -29,7 +29,9 @@ class Verdict:
     detected_at, isolated_at : int or None
         Sample at which the present fault was detected, and isolated.
     steps : mapping of str to Step
-        Answers of the observers that were stepped. Boxes and sets must be read before the next sample.
+        Answers of the observers that were stepped or started, "global" among them if the bank has a global
+        observer. Boxes and sets must be read before the next sample; those of an observer that was falsified
+        and starts again have nothing to read.
     """
 
     sample: int
@@ -58,13 +60,15 @@ class BankRecord:
     undecided : (K, n_observers) array of bool
         Answers that were neither a proof nor a point.
     died_at : mapping of str to int or None
-        First sample at which a model was declared falsified.
+        First sample at which a model was declared falsified; "global" is there if its observer was.
     certificates : mapping of str to certificate or None
         Proof of that falsification.
     detected_at, isolated_at : int or None
         FIRST sample of the run at which a fault was detected, and at which one was isolated.
     fault : str or None
         The fault that was isolated then.
+    global_seconds : (K,) array or None
+        Wall time of the global observer's step, NaN where it was not stepped; None if the bank has none.
     """
 
     names: tuple[str, ...]
@@ -77,6 +81,7 @@ class BankRecord:
     detected_at: int | None
     isolated_at: int | None
     fault: str | None
+    global_seconds: NDArray[np.float64] | None = None
 
 
 class Recorder:
@@ -93,6 +98,7 @@ class Recorder:
         self._detected_at: int | None = None
         self._isolated_at: int | None = None
         self._fault: str | None = None
+        self._global_seconds: NDArray[np.float64] | None = None
 
     def add(self, verdict: Verdict) -> None:
         """The next sample."""
@@ -106,10 +112,20 @@ class Recorder:
                 self._undecided[k, i] = step.verdict == "undecided"
                 if self._died_at[name] is None and not self._alive[k, i]:
                     self._died_at[name], self._certificates[name] = k, step.certificate
+        if GLOBAL in verdict.steps:
+            self._add_global(verdict, verdict.steps[GLOBAL])
         if self._detected_at is None:
             self._detected_at = verdict.detected_at
         if self._isolated_at is None:
             self._isolated_at, self._fault = verdict.isolated_at, verdict.fault
+
+    def _add_global(self, verdict: Verdict, step: Step) -> None:
+        if self._global_seconds is None:
+            self._global_seconds = np.full(len(self._alive), np.nan)
+        self._global_seconds[verdict.sample] = step.seconds
+        declared = step.verdict == "falsified" and verdict.state == "unexplained"
+        if declared and GLOBAL not in self._died_at:
+            self._died_at[GLOBAL], self._certificates[GLOBAL] = verdict.sample, step.certificate
 
     def record(self) -> BankRecord:
         """Everything so far."""
@@ -124,4 +140,5 @@ class Recorder:
             detected_at=self._detected_at,
             isolated_at=self._isolated_at,
             fault=self._fault,
+            global_seconds=self._global_seconds,
         )

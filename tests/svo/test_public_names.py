@@ -12,12 +12,12 @@ import pytest
 
 import svo
 from polytopes import HPolytope
-from svo import ArchitectureI, UncertainModel, WindowObserver
+from svo import ArchitectureI, ArchitectureII, UncertainModel, WindowObserver
 from svo.faults import SensorFault, Step
 
 NAMES = {
     "polytopes": ["HPolytope"],
-    "svo": ["ArchitectureI", "UncertainModel", "Uncertainty", "WindowObserver"],
+    "svo": ["ArchitectureI", "ArchitectureII", "UncertainModel", "Uncertainty", "WindowObserver"],
     "svo.plant": ["Plant"],
     "svo.faults": ["ActuatorFault", "Exponential", "Intermittent", "PlantFault", "Ramp", "SensorFault", "Step"],
     "svo.indices": ["detection_indices"],
@@ -32,6 +32,7 @@ ARGUMENTS = [
     (WindowObserver.step, ["u", "y", "u_next", "schedule"]),
     (WindowObserver.run, ["log"]),
     (ArchitectureI, ["nominal", "faults", "debounce", "recovery", "timeout"]),
+    (ArchitectureII, ["nominal", "faults", "global_", "class_one", "debounce", "recovery", "timeout"]),
     (ArchitectureI.update, ["y0", "u", "schedule"]),
     (ArchitectureI.step, ["u", "y", "u_next", "schedule"]),
 ]

@@ -1,0 +1,211 @@
+"""What all isolation banks share: they step their observers, ask a logic and start observers again."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polytopes import HPolytope
+from svo.isolation.logic import NOMINAL, IsolationLogic, LogicState
+from svo.isolation.record import BankRecord, Recorder, Verdict
+from svo.log import Log
+from svo.observers.step import Observer, Step
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The arguments of a bank's step, kept for observers that have to repeat it."""
+
+    u: ArrayLike | None
+    y: ArrayLike
+    u_next: ArrayLike | None
+    schedule: Any
+
+
+class Bank(ABC):
+    """A nominal observer and one observer a fault, driven together; `ArchitectureI` and `ArchitectureII` are banks.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The models: "nominal", then the faults.
+    observers : mapping of str to Observer
+    """
+
+    def __init__(self, logic: IsolationLogic, observers: Mapping[str, Observer], same_states: bool) -> None:
+        self.names = logic.names
+        self.observers: Mapping[str, Observer] = MappingProxyType(dict(observers))
+        self._logic = logic
+        _check_observers(self.observers, same_states)
+        self._forget()
+
+    # -- samples -----------------------------------------------------------------------------------
+
+    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Verdict:
+        """The first measurement, without a transition; ``u`` is needed only if D or a D_i is not zero.
+
+        Raises
+        ------
+        ValueError
+            If the bank has already started.
+        """
+        if self._sample is not None:
+            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
+        steps = {name: observer.update(y0, u=u, schedule=schedule) for name, observer in self._running.items()}
+        return self._conclude(0, steps, Sample(None, y0, u, schedule))
+
+    def step(
+        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
+    ) -> Verdict:
+        """One transition driven by u, then the measurement y; arguments as for the observers.
+
+        Raises
+        ------
+        ValueError
+            If there was no first measurement, or an observer refuses the arguments.
+        """
+        if self._sample is None:
+            raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
+        steps = {n: o.step(u, y, u_next=u_next, schedule=schedule) for n, o in self._running.items()}
+        return self._conclude(self._sample + 1, steps, Sample(u, y, u_next, schedule))
+
+    def reset(self, set: HPolytope) -> None:
+        """Forget everything; all models are alive and the state at the next measurement lies in ``set``."""
+        for observer in self.observers.values():
+            observer.reset(set)
+        self._forget()
+
+    def warm_up(self) -> float:
+        """Compile whatever the observers' steps need; returns the seconds that it took."""
+        return sum(observer.warm_up() for observer in self.observers.values())
+
+    def run(self, log: Log) -> BankRecord:
+        """All samples of a log, with its own schedule.
+
+        Raises
+        ------
+        ValueError
+            If the bank has already started, or the log is empty or has other channels than the models.
+        """
+        self._check_log(log)
+        recorder = Recorder(self.names, len(log))
+        recorder.add(self.update(log.y[0], u=log.u[0], schedule=log.schedule_at(0)))
+        for k in range(1, len(log)):
+            recorder.add(self.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=log.schedule_at(k)))
+        return recorder.record()
+
+    # -- what the architectures add ----------------------------------------------------------------
+
+    @abstractmethod
+    def _begin_again(
+        self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
+    ) -> LogicState:
+        """Start the observers that the logic asks for; ``steps`` may gain their answers."""
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _forget(self) -> None:
+        self._sample: int | None = None
+        self._latest = Sample(None, self._nothing(), None, None)
+        self._adopt(self._logic.initial())
+
+    def _adopt(self, state: LogicState) -> None:
+        self._state = state
+        self._running = {name: self.observers[name] for name in state.running}
+
+    def _conclude(self, k: int, steps: dict[str, Step], now: Sample) -> Verdict:
+        falsified, undecided = falsified_and_undecided(steps)
+        state = self._logic.advance(self._state, k, falsified, undecided)
+        state = self._begin_again(state, k, steps, falsified, now)
+        if state is not self._state:
+            self._adopt(state)
+        self._sample, self._latest = k, now
+        return Verdict(k, state.state, state.fault, state.alive, state.detected_at, state.isolated_at, steps)
+
+    def _start_from(self, name: str, set: HPolytope, at: Sample, y: ArrayLike | None = None) -> Step:
+        """Start an observer from a set of states at a sample; without y it only learns of inputs and schedule."""
+        observer = self.observers[name]
+        observer.reset(set)
+        return observer.update(self._nothing() if y is None else y, u=at.u_next, schedule=at.schedule)
+
+    def _predict_from(self, name: str, set: HPolytope, now: Sample) -> Step:
+        """Start from the sample before, leaving out the measurement that nothing explains."""
+        self._start_from(name, set, self._latest)
+        return self.observers[name].step(now.u, self._nothing(), u_next=now.u_next, schedule=now.schedule)
+
+    def _nothing(self) -> ArrayLike:
+        return np.full(self.observers[NOMINAL].model.n_outputs, np.nan)
+
+    def _check_log(self, log: Log) -> None:
+        if self._sample is not None:
+            raise ValueError("run was called on a bank that has already started; call reset(set), or use a fresh bank")
+        model = self.observers[NOMINAL].model
+        if len(log) == 0:
+            raise ValueError("log has no samples; expected at least one")
+        for name, wanted in (("u", model.n_inputs), ("y", model.n_outputs)):
+            shape = getattr(log, name).shape
+            if shape[1] != wanted:
+                raise ValueError(f"log.{name} has shape {shape}; expected (samples, {wanted}), as the models have")
+
+
+def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[str, ...]) -> dict[str, Observer]:
+    """All models' observers by name, the nominal one first; refuses bad names and the reserved ones."""
+    taken = " or ".join(repr(name) for name in reserved)
+    if not isinstance(faults, Mapping):
+        raise TypeError(f"faults is a {type(faults).__name__}; expected a mapping of fault names to observers")
+    if not faults:
+        raise ValueError("faults is empty; expected at least one fault observer (to detect only, run one observer)")
+    for name in faults:
+        if not isinstance(name, str) or not name.strip() or name in reserved:
+            raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")
+    return {NOMINAL: nominal, **faults}
+
+
+def check_counts(debounce: int, recovery: int | None, timeout: int | None) -> None:
+    """Refuse counts of samples below one."""
+    _check_count("debounce", debounce)
+    _check_count("recovery", recovery, optional=True)
+    _check_count("timeout", timeout, optional=True)
+
+
+def falsified_and_undecided(steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
+    """Names of the falsified and of the undecided observers."""
+    falsified: list[str] = []
+    undecided: list[str] = []
+    for name, step in steps.items():
+        if step.verdict != "consistent":
+            (falsified if _is_proved(name, step) else undecided).append(name)
+    return falsified, undecided
+
+
+def _is_proved(name: str, step: Step) -> bool:
+    if step.verdict == "falsified" and step.certificate is None:
+        raise ValueError(f"observer {name!r} answered 'falsified' without a certificate; expected one, or 'undecided'")
+    return step.verdict == "falsified"
+
+
+def _check_count(name: str, value: int | None, optional: bool = False) -> None:
+    if value is None and optional:
+        return
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1{', or None' if optional else ''}")
+
+
+def _check_observers(observers: Mapping[str, Observer], same_states: bool) -> None:
+    owners: dict[int, str] = {}
+    for name, observer in observers.items():
+        if id(observer) in owners:
+            raise ValueError(f"{name!r} and {owners[id(observer)]!r} are the same observer; give each name its own")
+        owners[id(observer)] = name
+    nominal = observers[NOMINAL].model
+    for name, observer in observers.items():
+        for attribute in ("n_inputs", "n_outputs", "Ts", *(("n_states",) if same_states else ())):
+            found, wanted = getattr(observer.model, attribute), getattr(nominal, attribute)
+            if found != wanted:
+                raise ValueError(f"the model of {name!r} has {attribute} = {found}; expected {wanted}, as nominal has")
