@@ -17,6 +17,14 @@ from svo.observers import window_kernel as kernel
 from svo.observers.fallback import candidates, is_feasible
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
 from svo.observers.step import VerdictName
+from svo.observers.window_setup import (
+    channel_owners,
+    finite_box,
+    jitter,
+    joint_rows,
+    output_is_disturbed,
+    template_rows,
+)
 from svo.observers.window_step import WindowRecord, WindowStep
 
 Array = NDArray[np.float64]
@@ -38,8 +46,8 @@ class WindowObserver:
     The window holds the state at its first sample, every disturbance and every channel of uncertainty since;
     measurements inside it stay valid, and one linear program a sample decides whether anything explains them.
     When the window slides, the new first state is bounded in the template's directions by all data of the
-    window. It slides by 2 N // 5 samples at once (at least one), so that it holds at least N steps and the
-    cost of the arrival set is shared.
+    window. It slides by 2 N // 5 samples at once (at least one), so that it holds at least N steps, and those
+    samples share the programs of the arrival set.
 
     Parameters
     ----------
@@ -75,7 +83,7 @@ class WindowObserver:
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        self._configure(model, horizon, _template_rows(template, model.n_states), eps)
+        self._configure(model, horizon, template_rows(template, model.n_states), eps)
         self.reset(initial)
 
     # -- the protocol ----------------------------------------------------------------------------
@@ -88,9 +96,9 @@ class WindowObserver:
         ValueError
             If the set is empty, unbounded or of the wrong dimension.
         """
-        lower, upper = _finite_box(set, self.model.n_states)
+        lower, upper = finite_box(set, self.model.n_states)
         steps = _GROWING_START if self.horizon is None else self.horizon + self._block - 1
-        self._begin(ArrivalSet(lower, upper, *_rows_of(set)), steps)
+        self._begin(ArrivalSet(lower, upper, *joint_rows(set)), steps)
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> WindowStep:
         """The first measurement, without a transition.
@@ -249,8 +257,8 @@ class WindowObserver:
         self.eps = float(eps)
         self._block = 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
         self._template = template
-        self._owner = _channel_owners(model)
-        self._late = _output_is_disturbed(model)
+        self._owner = channel_owners(model)
+        self._late = output_is_disturbed(model)
 
     def _begin(self, initial: ArrivalSet, steps: int) -> None:
         """An empty window of so many steps at most, anchored at the first states."""
@@ -265,7 +273,7 @@ class WindowObserver:
     def _allocate(self, steps: int) -> None:
         model, polytope = self.model, self.model.disturbance_polytope
         w_rows = (
-            _rows_of(polytope)
+            joint_rows(polytope)
             if polytope is not None
             else (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0))
         )
@@ -284,7 +292,7 @@ class WindowObserver:
         w["owner"][:] = self._owner
         w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
         w["w_rows"][:], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
-        w["jitter"][:] = _jitter(w["jitter"].size)
+        w["jitter"][:] = jitter(w["jitter"].size)
         self._window = kernel.new_window(w)
 
     def _grow(self) -> None:
@@ -365,8 +373,8 @@ class WindowObserver:
     def _solve_until(self, end: float) -> VerdictName:
         """The arrival programs in small portions of pivots, until a time is reached."""
         clock, decided = self._arrays["clock"], False
-        full = clock[kernel.TIME] - clock[kernel.BASE] == self._size.N
-        for program in range(2 * self._size.nt if full else 1):
+        base, time = clock[kernel.BASE], clock[kernel.TIME]
+        for program in range(*kernel.arrival_programs.py_func(self._size, base, time)):
             verdict, late = kernel.UNDECIDED, False
             while verdict == kernel.UNDECIDED and not late:
                 late = perf_counter() >= end
@@ -375,7 +383,7 @@ class WindowObserver:
             if verdict == kernel.EMPTY_CANDIDATE and self._prove():
                 return "falsified"
             decided = decided or verdict == kernel.CONSISTENT
-        if full:
+        if time - base == self._size.N:
             clock[kernel.PENDING] = 1
         return "consistent" if decided else "undecided"
 
@@ -422,55 +430,3 @@ class WindowObserver:
             self._solve(kernel.QUERY)
             values[i] = self._arrays["answer"][0]
         return values
-
-
-def _jitter(size: int) -> Array:
-    """Relative changes of the cost between 0.5 and 1 in units of 1e-11, signs mixed; always the same."""
-    rng = np.random.default_rng(0)
-    return 1e-11 * rng.uniform(0.5, 1.0, size) * rng.choice([-1.0, 1.0], size)
-
-
-def _template_rows(template: str | ArrayLike, n: int) -> Array:
-    if isinstance(template, str):
-        if template != "box":
-            raise ValueError(f"template is {template!r}; expected 'box' or an array (rows, {n}) of directions")
-        return np.zeros((0, n))
-    rows = np.array(template, dtype=float)
-    if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
-        raise ValueError(f"template has shape {rows.shape}; expected finite directions of shape (rows, {n})")
-    return rows
-
-
-def _channel_owners(model: UncertainModel) -> NDArray[np.int64]:
-    """For each channel, the item of the stack that it belongs to."""
-    stack = model.stack(model.schedule)
-    owners = [item for item in range(1, len(stack)) for _ in range(int(np.linalg.matrix_rank(stack[item], rtol=1e-12)))]
-    return np.array(owners, dtype=np.int64)
-
-
-def _output_is_disturbed(model: UncertainModel) -> bool:
-    """Whether w or a channel may enter the output, at whatever schedule."""
-    arrays = [model.F, *(array for u in model.uncertainties for array in (u.C, u.D, u.c, u.F))]
-    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
-
-
-def _rows_of(P: HPolytope) -> tuple[Array, Array, Array]:
-    """Rows of a polytope that are no bounds on single variables, two-sided; equalities have both sides equal."""
-    rows = np.vstack([P.A, P.C])
-    lower = np.concatenate([np.full(len(P.b), -np.inf), P.d])
-    upper = np.concatenate([P.b, P.d])
-    joint = np.count_nonzero(rows, axis=1) > 1
-    return rows[joint], lower[joint], upper[joint]
-
-
-def _finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
-    if not isinstance(P, HPolytope):
-        raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
-    if P.dim != n:
-        raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
-    if P.emptiness().status != "nonempty":
-        raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
-    lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
-    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        raise ValueError("initial is unbounded; expected a bounded set of first states, such as a box")
-    return lower, upper

@@ -24,7 +24,7 @@ from svo.observers.window_kernel.memory import (
     allocate,
     new_window,
 )
-from svo.observers.window_kernel.programs import ARRIVAL, CHANNELS, NEWEST, QUERY, solve
+from svo.observers.window_kernel.programs import ARRIVAL, CHANNELS, NEWEST, QUERY, arrival_programs, solve
 from svo.observers.window_kernel.sample import (
     BAD_INPUT,
     BAD_MATRIX,
@@ -62,6 +62,7 @@ __all__ = [
     "UNDECIDED",
     "Sizes",
     "allocate",
+    "arrival_programs",
     "channel_factors",
     "complete",
     "enter",

@@ -104,28 +104,45 @@ def _store_bound(lower, upper, i, side, bound):
         lower[i] = -bound
 
 
+@njit(error_model="numpy")
+def arrival_programs(size, base, time):
+    """First and last (excluded) arrival program of a sample.
+
+    The 2 nt supports of the state at base + block are spread over the last `block` samples before the slide; each
+    is an outer bound by the data of its own sample. Before those, one program decides emptiness.
+    """
+    turn = time - base - (size.N - size.block + 1)
+    if turn < 0:
+        return 0, 1
+    share = -(-2 * size.nt // size.block)
+    first = min(turn * share, 2 * size.nt - 1)  # at least one program: every sample is decided
+    return first, min(first + share, 2 * size.nt)
+
+
 def _compile_solve(sources):
     @njit(cache=True, error_model="numpy")
     def solve(w, size, task, start, stop, limit):
         """The programs of a task, numbers `start` to `stop` - 1: two a direction, upper bound first.
 
-        ARRIVAL decides emptiness and, once the window is full, bounds the state at base + block; NEWEST bounds the
-        newest state in the template's directions, QUERY in the one that was asked for; CHANNELS tightens the bounds
-        of s that leave its sign open. Returns (verdict, program that found the window empty or -1).
+        ARRIVAL decides emptiness and, before a slide, bounds the state at base + block; NEWEST bounds the newest
+        state in the template's directions, QUERY in the one that was asked for; CHANNELS tightens the bounds of s
+        that leave its sign open. Returns (verdict, program that found the window empty or -1).
         """
         sources  # noqa: B018 - in the closure, so part of the cache's key
         base, time = w.clock[BASE], w.clock[TIME]
-        full = time - base == size.N
         verdict = UNDECIDED
-        first, count = 0, 2 * size.nt if full else 1
-        if task == NEWEST:
-            first, count = 2 * size.nt, 2 * size.nt
+        basis, begin, count = 0, 0, 0
+        if task == ARRIVAL:
+            begin, count = arrival_programs(size, base, time)
+        elif task == NEWEST:
+            basis, count = 2 * size.nt, 2 * size.nt
         elif task == CHANNELS:
-            first, count = 4 * size.nt, 2 * size.nq
+            basis, count = 4 * size.nt, 2 * size.nq
         elif task == QUERY:
-            first, count = 4 * size.nt + 2 * size.nq, 1
+            basis, count = 4 * size.nt + 2 * size.nq, 1
+        bounds_arrival = time - base > size.N - size.block
         v = time % (size.N + size.late)
-        for program in range(start, min(stop, count)):
+        for program in range(max(begin, start), min(stop, count)):
             i, side = program // 2, program % 2
             sign = 1.0 - 2.0 * side
             if task == CHANNELS and not (w.s_lower[v, i] < 0.0 < w.s_upper[v, i]):
@@ -142,7 +159,7 @@ def _compile_solve(sources):
                 fill(w.cost, 0.0)
                 w.cost[0] = 1.0
                 constant, rounding = 0.0, 0.0
-            outcome, value = maximise(w, size, first + program, limit)
+            outcome, value = maximise(w, size, basis + program, limit)
             bound = constant + value + rounding + 4.0 * UNIT * (abs(constant) + abs(value))
             if task == NEWEST:
                 _store_bound(w.now_lower, w.now_upper, i, side, bound)
@@ -151,13 +168,13 @@ def _compile_solve(sources):
             elif task == CHANNELS:
                 known = w.s_upper[v, i] if side == 0 else -w.s_lower[v, i]
                 _store_bound(w.s_lower[v], w.s_upper[v], i, side, min(bound, known))
-            elif full:
+            elif bounds_arrival:
                 _store_bound(w.new_lower, w.new_upper, i, side, bound)
             if outcome == EMPTY:  # its bound is stored all the same: the proof may not hold
                 return EMPTY_CANDIDATE, program
             if outcome == OPTIMAL:
                 verdict = CONSISTENT
-        if task == ARRIVAL and full and stop >= count:
+        if task == ARRIVAL and time - base == size.N and stop >= count:
             w.clock[PENDING] = 1
         return verdict, -1
 

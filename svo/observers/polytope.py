@@ -1,0 +1,256 @@
+"""The polytope observer: explicit H-polytopes from sample to sample, the paper's method in its sound form."""
+
+from __future__ import annotations
+
+import warnings
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes import HPolytope, warm_up
+from svo.log import Log
+from svo.model import UncertainModel
+from svo.observers.polytope_sets import Outcome, PublishedRecursion, Recursion, Sample, SoundRecursion
+from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
+from svo.observers.vertex_images import transitions
+
+Array = NDArray[np.float64]
+_PUBLISHED_STACKS = 4096
+
+UNSOUND = (
+    "as_published=True reproduces equation (3) of the paper, which keeps the measurements inside the stack of every "
+    "vertex of Delta. With uncertain A a state at an interior Delta is a mix of vertex trajectories that need not "
+    "satisfy them, so the set can exclude the true state and a healthy plant can be falsified. Leave it out for the "
+    "sound form."
+)
+
+
+class PolytopeObserver:
+    """Set-valued observer on explicit polytopes (Rosa and Silvestre 2013, section 2), in a form that is sound.
+
+    The set of the next state is the intersection over m = 1..N of the hulls, over the vertices of Delta, of the
+    m-step images of X(k+1-m) without any later measurement, and then the measurement. Where w enters the output as
+    well, (x, w) is kept as one set, so that the measurement also says what w drives the next state.
+
+    Parameters
+    ----------
+    model : UncertainModel
+    initial : HPolytope
+        Bounded set that contains the state at the first sample.
+    horizon : int
+        N >= 1. With exact sets N > 1 changes nothing, since the one-step image lies in all the others; under a
+        facet budget longer images recover part of what the reduction gave away.
+    max_facets : int or None
+        Sets are reduced outward to so many facets, at least twice their dimension (n, or n + nw where w enters the
+        output). None = exact, until a set has more than 500 facets.
+    eps : float
+        Every measurement row is widened by eps (|y| + |C||x|max + |D u| + |c| + |F| wmax + n), for the rounding
+        of the data.
+    as_published : bool
+        Equation (3) as printed, for reproduction only: unsound with uncertain A, and it warns. No F and no
+        uncertain output.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments that do not fit, and for an initial set that is empty or unbounded.
+
+    Notes
+    -----
+    "falsified" comes with a `PolytopeCertificate` that was checked in exact arithmetic; it is conditional on the set
+    before the measurement, which is computed in floats and rounded outward. After it the observer stays falsified
+    until `reset`. A Delta in the output costs two rows a sensor (chords), each Delta taken as free there: wider than
+    the channels of `WindowObserver`, which keep one Delta in state and output. Facets grow quickly with disturbances
+    and uncertainties: meant for small models and as a reference; `WindowObserver` is the fast one.
+    """
+
+    def __init__(
+        self,
+        model: UncertainModel,
+        initial: HPolytope,
+        horizon: int = 1,
+        max_facets: int | None = 60,
+        eps: float = 1e-9,
+        as_published: bool = False,
+    ) -> None:
+        if not isinstance(model, UncertainModel):
+            raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
+        if not isinstance(horizon, int | np.integer) or horizon < 1:
+            raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1")
+        if not (np.isfinite(eps) and eps >= 0):
+            raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
+        coupled = _has_any(model.F, *(item.F for item in model.uncertainties))
+        smallest = 2 * (model.n_states + (model.n_disturbances if coupled else 0))
+        if max_facets is not None and (not isinstance(max_facets, int | np.integer) or max_facets < smallest):
+            raise ValueError(
+                f"max_facets is {max_facets!r}; expected an integer of at least {smallest}, or None for exact"
+            )
+        self.model = model
+        self.horizon = int(horizon)
+        self._recursion: Recursion
+        if as_published:
+            _check_published(model, coupled, self.horizon)
+            warnings.warn(UNSOUND, UserWarning, stacklevel=2)
+            self._recursion = PublishedRecursion(model, self.horizon, max_facets, float(eps))
+        else:
+            self._recursion = SoundRecursion(model, self.horizon, max_facets, float(eps), coupled)
+        self.reset(initial)
+
+    def reset(self, set: HPolytope) -> None:
+        """Forget all data; the state at the next measurement lies in ``set``.
+
+        Raises
+        ------
+        ValueError
+            If the set is empty, unbounded or of the wrong dimension.
+        """
+        _check_initial(set, self.model.n_states)
+        self._initial = set
+        self._last: tuple[Sample, Outcome] | None = None
+
+    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> PolytopeStep:
+        """The first measurement, without a transition.
+
+        Parameters
+        ----------
+        y0 : (ny,) array
+            NaN = that sensor is missing.
+        u : (nu,) array, optional
+            Needed only if D or a D_i is not zero.
+        schedule : optional
+            Scheduling value at this sample.
+        """
+        begun = perf_counter()
+        if self._last is not None:
+            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
+        sample = self._sample(0, y0, self._inputs("u", u, self.model.uses_input_in_output), schedule)
+        return self._keep(sample, self._recursion.first(self._initial, sample), begun)
+
+    def step(
+        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
+    ) -> PolytopeStep:
+        """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
+
+        Parameters
+        ----------
+        u : (nu,) array
+        y : (ny,) array
+            NaN = that sensor is missing; all NaN = prediction only.
+        u_next : (nu,) array, optional
+            u(k+1); needed only if D or a D_i is not zero.
+        schedule : optional
+            Scheduling value at the sample of y; it also gives the matrices of the next transition.
+
+        Raises
+        ------
+        ValueError
+            For a wrong shape, or an infinite or missing value. The observer is unchanged.
+        FacetLimitError
+            In exact mode, when a set has too many facets. The observer is unchanged.
+        UndecidedError
+            If a set is too thin for any linear program to settle. The observer is unchanged.
+        """
+        begun = perf_counter()
+        inputs = self._inputs("u", u, True)
+        following = self._inputs("u_next", u_next, self.model.uses_input_in_output)
+        if self._last is None:
+            sample = self._sample(1, y, following, schedule)
+            start = self._sample(0, np.full(self.model.n_outputs, np.nan), inputs, schedule)
+            last = self._recursion.first(self._initial, start)
+        else:
+            start, last = self._last
+            sample = self._sample(start.number + 1, y, following, schedule)
+        if last.verdict == "falsified":
+            return self._keep(sample, last, begun)
+        maps = transitions(start.stack, self.model, inputs)
+        return self._keep(sample, self._recursion.next(last, start, maps, sample), begun)
+
+    def run(self, log: Log) -> PolytopeRecord:
+        """All samples of a log, with the box of the state at each."""
+        steps = []
+        for k in range(len(log)):
+            following = log.u[k] if self.model.uses_input_in_output else None
+            schedule = log.schedule_at(k)
+            steps.append(
+                self.update(log.y[k], following, schedule)
+                if k == 0
+                else self.step(log.u[k - 1], log.y[k], following, schedule)
+            )
+        boxes = np.array([step.box for step in steps])
+        return PolytopeRecord(
+            verdicts=tuple(step.verdict for step in steps),
+            lower=boxes[:, 0],
+            upper=boxes[:, 1],
+            facets=np.array([len(step.joint.b) for step in steps]),
+            seconds=np.array([step.seconds for step in steps]),
+            certificate=steps[-1].certificate,
+        )
+
+    def warm_up(self) -> float:
+        """Compile the linear programs, without touching this observer; returns the seconds it took."""
+        begun = perf_counter()
+        warm_up()
+        return perf_counter() - begun
+
+    def _keep(self, sample: Sample, outcome: Outcome, begun: float) -> PolytopeStep:
+        self._last = sample, outcome
+        return PolytopeStep(
+            sample.number, outcome.verdict, outcome.certificate, perf_counter() - begun, outcome.joint,
+            self.model.n_states,
+        )  # fmt: skip
+
+    def _sample(self, number: int, y: ArrayLike, u: Array, schedule: Any) -> Sample:
+        outputs = np.asarray(y, dtype=float)
+        if outputs.shape != (self.model.n_outputs,):
+            raise ValueError(f"y has shape {outputs.shape}; expected ({self.model.n_outputs},), one value a sensor")
+        if np.isinf(outputs).any():
+            raise ValueError(f"y is {outputs}; expected finite numbers, or NaN for a missing sensor")
+        if self.model.is_scheduled and schedule is None:
+            raise ValueError("schedule is missing: the model has arrays that are functions of it: pass schedule=...")
+        stack = self.model.stack(schedule)
+        if not np.isfinite(stack).all():
+            raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected finite numbers")
+        lower, upper, noise = self.model.bounds(schedule)
+        disturbances = self.model.disturbance_polytope
+        if disturbances is None and lower.size:
+            disturbances = HPolytope.box(lower, upper)
+        return Sample(number, stack, disturbances, noise, u, outputs)
+
+    def _inputs(self, name: str, u: ArrayLike | None, needed: bool) -> Array:
+        size = self.model.n_inputs
+        if not needed or (u is None and size == 0):
+            return np.zeros(size)
+        if u is None:
+            why = ", since D or a D_i is not zero" if name != "u" else ""
+            raise ValueError(f"{name} is missing; expected shape ({size},){why}")
+        array = np.asarray(u, dtype=float)
+        if array.shape != (size,) or not np.isfinite(array).all():
+            raise ValueError(f"{name} has shape {array.shape}; expected finite numbers of shape ({size},)")
+        return array
+
+
+def _has_any(*arrays: Any) -> bool:
+    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
+
+
+def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None:
+    if coupled or _has_any(*(array for item in model.uncertainties for array in (item.C, item.D, item.c))):
+        raise ValueError("as_published is True, but equation (3) has neither F nor an uncertain output: leave it out")
+    stacks = 2 ** (horizon * len(model.uncertainties))
+    if stacks > _PUBLISHED_STACKS:
+        raise ValueError(
+            f"horizon is {horizon}: equation (3) has {stacks} vertex stacks; expected at most {_PUBLISHED_STACKS}"
+        )
+
+
+def _check_initial(P: HPolytope, n: int) -> None:
+    if not isinstance(P, HPolytope):
+        raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
+    if P.dim != n:
+        raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
+    if P.emptiness().status != "nonempty":
+        raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
+    if not P.is_bounded():
+        raise ValueError("initial is unbounded; expected a bounded set of first states, such as a box")

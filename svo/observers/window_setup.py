@@ -1,0 +1,67 @@
+"""What a window observer works out once: its template, its channels, its set of first states."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes import HPolytope
+from svo.model import UncertainModel
+
+Array = NDArray[np.float64]
+
+
+def jitter(size: int) -> Array:
+    """Relative changes of the cost between 0.5 and 1 in units of 1e-11, signs mixed; always the same."""
+    rng = np.random.default_rng(0)
+    return 1e-11 * rng.uniform(0.5, 1.0, size) * rng.choice([-1.0, 1.0], size)
+
+
+def template_rows(template: str | ArrayLike, n: int) -> Array:
+    """Directions (r, n) besides the axes in which arrival sets are bounded."""
+    if isinstance(template, str):
+        if template != "box":
+            raise ValueError(f"template is {template!r}; expected 'box' or an array (rows, {n}) of directions")
+        return np.zeros((0, n))
+    rows = np.array(template, dtype=float)
+    if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
+        raise ValueError(f"template has shape {rows.shape}; expected finite directions of shape (rows, {n})")
+    return rows
+
+
+def channel_owners(model: UncertainModel) -> NDArray[np.int64]:
+    """For each channel, the item of the stack that it belongs to."""
+    stack = model.stack(model.schedule)
+    owners = [item for item in range(1, len(stack)) for _ in range(int(np.linalg.matrix_rank(stack[item], rtol=1e-12)))]
+    return np.array(owners, dtype=np.int64)
+
+
+def output_is_disturbed(model: UncertainModel) -> bool:
+    """Whether w or a channel may enter the output, at whatever schedule."""
+    arrays = [model.F, *(array for u in model.uncertainties for array in (u.C, u.D, u.c, u.F))]
+    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
+
+
+def joint_rows(P: HPolytope) -> tuple[Array, Array, Array]:
+    """Rows of a polytope that are no bounds on single variables, two-sided; equalities have both sides equal."""
+    rows = np.vstack([P.A, P.C])
+    lower = np.concatenate([np.full(len(P.b), -np.inf), P.d])
+    upper = np.concatenate([P.b, P.d])
+    joint = np.count_nonzero(rows, axis=1) > 1
+    return rows[joint], lower[joint], upper[joint]
+
+
+def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
+    """Bounds of a set of first states, rounded outward where they had to be computed."""
+    if not isinstance(P, HPolytope):
+        raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
+    if P.dim != n:
+        raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
+    if P.emptiness().status != "nonempty":
+        raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
+    lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
+    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+        raise ValueError("initial is unbounded; expected a bounded set of first states, such as a box")
+    given = len(P.C) == 0 and np.isin(P.A, (-1.0, 0.0, 1.0)).all() and (np.count_nonzero(P.A, axis=1) == 1).all()
+    room = 0.0 if given else 1e-12 * np.maximum(np.abs(lower), np.abs(upper))
+    return lower - room, upper + room
