@@ -2,15 +2,20 @@
 
 Run with ``python -m benchmarks.polytopes``.  Peers are cdd, HiGHS (one warm program per row), the Parma library (exact)
 and the library polytope, each where it is installed and ends in reasonable time.  Times are milliseconds, best of
-several runs; the agreement column is the largest difference of support functions in 200 directions.  ``--out DIR`` also
-writes the table as text and as a picture.
+several runs; the agreement column is the largest difference of support functions in 200 directions.  Fresh processes
+measure the import, the first compilation and the memory of a dense projection.  ``--out DIR`` also writes the table as
+text and as a picture.
 """
 
 import argparse
 import importlib
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
@@ -235,6 +240,43 @@ def draw(timings: list[Timing], path: Path) -> None:
     plt.close(figure)
 
 
+def fresh(code: str, **environment: str) -> str:
+    """What a fresh interpreter prints."""
+    return subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **environment}, capture_output=True, text=True, check=True
+    ).stdout.strip()
+
+
+TIMED = "from time import perf_counter; {0}; t = perf_counter(); {1}; print(perf_counter() - t)"
+IMPORT = TIMED.format("pass", "import polytopes")
+WARM_UP = TIMED.format("import polytopes", "polytopes.warm_up()")
+MEMORY = """
+import resource, tracemalloc
+from benchmarks.polytopes import sparse_polytope
+P = sparse_polytope(6, 40, 6)
+sparse_polytope(5, 20, 5).project(range(3))
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+P.project(range(4))
+grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+tracemalloc.start()
+sparse_polytope(6, 40, 6).project(range(4))
+print(f"{tracemalloc.get_traced_memory()[1] / 2**20:.1f} MB allocated, {grown / 2**10:.0f} MB added to the process")
+"""
+
+
+def costs_of_a_process() -> str:
+    """Import, compilation and memory, each in a fresh process."""
+    with TemporaryDirectory() as cache:
+        first = float(fresh(WARM_UP, NUMBA_CACHE_DIR=cache))
+        cached = float(fresh(WARM_UP, NUMBA_CACHE_DIR=cache))
+    imported = min(float(fresh(IMPORT)) for _ in range(3))
+    return (
+        f"import polytopes: {imported:.2f} s\n"
+        f"warm_up: {first:.1f} s the first time on a machine, {cached:.2f} s after\n"
+        f"memory of a projection R^6 -> R^4, 40 dense rows: {fresh(MEMORY)}"
+    )
+
+
 def main(out: Path | None = None) -> None:
     """Measure, print, and write to a folder if there is one."""
     warm_up()
@@ -250,6 +292,7 @@ def main(out: Path | None = None) -> None:
     timings = [timing for case in cases for timing in measure(case)]
     console = Console(width=140, record=out is not None)
     console.print(results_table(timings))
+    console.print(costs_of_a_process())
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         (out / "polytopes.txt").write_text(console.export_text())

@@ -4,9 +4,10 @@ from polytopes.certificate import Certificate
 from polytopes.emptiness import Emptiness
 from polytopes.errors import EmptySetError, ProjectionLimitError, UnboundedError, UndecidedError
 from polytopes.generators import Generators
-from polytopes.hpolytope import HPolytope, convex_hull
+from polytopes.hpolytope import HPolytope
 from polytopes.linear_program import warm_up
 from polytopes.support import Ball, SupportResult
+from polytopes.unions import convex_hull, union_bounds
 
 __all__ = [
     "Ball",
@@ -20,5 +21,6 @@ __all__ = [
     "UnboundedError",
     "UndecidedError",
     "convex_hull",
+    "union_bounds",
     "warm_up",
 ]

@@ -14,8 +14,9 @@ from polytopes.emptiness import Emptiness
 from polytopes.errors import as_array, as_matrix, as_vector
 from polytopes.generators import Generators, generators, rows_of_generators
 from polytopes.hull import rows_of_points
+from polytopes.inner_box import inner_box
 from polytopes.redundancy import minimal_rows
-from polytopes.rows import Rows
+from polytopes.rows import Rows, same_space
 from polytopes.support import Ball, SupportResult
 from polytopes.vertices import vertices
 
@@ -148,6 +149,19 @@ class HPolytope(Rows):
         """
         return support_functions.bounding_box(self)
 
+    def inner_box(self) -> tuple[Floats, Floats]:
+        """A largest box inside a bounded set: lower (n,) and upper (n,); it satisfies the rows to rounding.
+
+        First the largest one with the proportions of the bounding box (one linear program), then each face moved out
+        as far as it goes, so that no larger box contains it; of all boxes inside, it need not have the largest volume.
+
+        Raises
+        ------
+        EmptySetError, UnboundedError
+            If there is no such box.
+        """
+        return inner_box(self)
+
     def chebyshev(self) -> Ball:
         """A largest ball in the set (within the affine set of the equalities): centre and radius, inf if unlimited.
 
@@ -178,7 +192,7 @@ class HPolytope(Rows):
         """
         slack = _tolerance(tol)
         if isinstance(x, Rows):
-            return containment.contains_set(self, _same_space(self, x), slack)
+            return containment.contains_set(self, same_space(self, x), slack)
         points = as_array("x", x, np.ndim(np.asarray(x)))
         if points.ndim not in (1, 2) or points.shape[-1] != self.dim:
             raise ValueError(f"x has shape {points.shape}; expected ({self.dim},) or (k, {self.dim}).")
@@ -187,7 +201,7 @@ class HPolytope(Rows):
 
     def equals(self, Q: Rows, tol: float = 1e-9) -> bool:
         """Whether each set contains the other within `tol` (see `contains`)."""
-        return containment.equal_sets(self, _same_space(self, Q), _tolerance(tol))
+        return containment.equal_sets(self, same_space(self, Q), _tolerance(tol))
 
     def vertices(self) -> Floats:
         """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
@@ -235,7 +249,7 @@ class HPolytope(Rows):
 
     def intersection(self, Q: Rows) -> Self:
         """Points in both sets: the rows of both."""
-        _same_space(self, Q)
+        same_space(self, Q)
         inequalities = np.vstack([self.A, Q.A]), np.concatenate([self.b, Q.b])
         return type(self)(*inequalities, np.vstack([self.C, Q.C]), np.concatenate([self.d, Q.d]))
 
@@ -280,14 +294,14 @@ class HPolytope(Rows):
 
         Fourier-Motzkin from 2 n coordinates while that is cheap, then the hull of all sums of vertices (bounded sets).
         """
-        return type(self)(*combinations.minkowski_sum(self, _same_space(self, Q)))
+        return type(self)(*combinations.minkowski_sum(self, same_space(self, Q)))
 
     def pontryagin_difference(self, Q: Rows) -> Self:
         """``{x : x + y in P for all y in Q}``: one linear program per row; the whole space if Q is empty.
 
         An equality of P survives only if it is constant over Q, to 1e-12 of its size.
         """
-        return type(self)(*combinations.pontryagin_difference(self, _same_space(self, Q)))
+        return type(self)(*combinations.pontryagin_difference(self, same_space(self, Q)))
 
     def project(
         self, keep: Sequence[int], method: str = "auto", max_rows: int = 20_000, outer: bool = False
@@ -368,36 +382,10 @@ class HPolytope(Rows):
         return plotting.plot(self, ax, pair, style)
 
 
-def convex_hull(sets: Sequence[HPolytope]) -> HPolytope:
-    """Closed convex hull of a union; empty sets add nothing.
-
-    Bounded sets: the hull of their vertices.  Otherwise a projection of the lifted form of Balas (1985), in as many
-    coordinates as all sets together.
-
-    Parameters
-    ----------
-    sets : sequence of HPolytope
-        At least one, all of one dimension.
-    """
-    if not sets:
-        raise ValueError("sets is empty; expected at least one HPolytope.")
-    for P in sets:
-        _same_space(sets[0], P)
-    return HPolytope(*combinations.hull_of_union(sets))
-
-
 def _tolerance(tol: float) -> float:
     if not tol >= 0.0:
         raise ValueError(f"tol is {tol}; expected a nonnegative distance.")
     return float(tol)
-
-
-def _same_space(P: Rows, Q: Rows) -> Rows:
-    if not isinstance(Q, Rows):
-        raise TypeError(f"Q is a {type(Q).__name__}; expected an HPolytope.")
-    if Q.dim != P.dim:
-        raise ValueError(f"Q has dimension {Q.dim}; expected {P.dim}, the dimension of this set.")
-    return Q
 
 
 def _block_diagonal(P: Floats, Q: Floats) -> Floats:

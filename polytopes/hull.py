@@ -1,5 +1,7 @@
 """Convex hulls: of points, and of a set known only by its support points."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,7 @@ from polytopes.redundancy import facets
 from polytopes.rows import Rows
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
 _FLAT = 1e-12  # relative width below which points are taken to lie in a subspace
 _SLIVER = 1e-5  # relative volume and least edge of a simplex that fixes its hyperplane
 _TOUCHING = 1e-13  # distance from a hyperplane at which a point lies on it (widths are about one)
@@ -30,10 +33,10 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     d = C @ centre
     if rank == 0:
         return np.empty((0, n)), np.empty(0), np.eye(n), V[0].copy()
-    found, certain = _facets(offsets @ axes[:rank].T / sizes[:rank])
-    normals = found[:, :-1] / sizes[:rank] @ axes[:rank]
+    found = _facets(offsets @ axes[:rank].T / sizes[:rank])
+    normals = found.rows[:, :-1] / sizes[:rank] @ axes[:rank]
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    A, b = _without_doubt(normals, (V @ normals.T).max(axis=0), certain, centre, axes[:rank])
+    A, b = _without_doubt(normals, (V @ normals.T).max(axis=0), found.certain(), centre, axes[:rank])
     return A, b, C, d
 
 
@@ -45,28 +48,52 @@ def _without_doubt(A: Floats, b: Floats, certain: bool, inner: Floats, axes: Flo
     return A[kept], b[kept]
 
 
-def _facets(points: Floats) -> tuple[Floats, bool]:
-    """Distinct facets of the hull of full-dimensional points of widths about one, and whether each surely is one.
+@dataclass(frozen=True, eq=False)
+class _Facets:
+    """Facets of the hull of full-dimensional points (k, n) of widths about one, as Qhull found them.
 
-    Rows are outward unit normals and minus the offsets.  A half-space that holds all points and touches n of them that
-    do not lie near a smaller flat is a facet; no other row is the same facet if none is nearly equal.
+    `rows` are distinct outward unit normals with minus the offsets, `simplices` (f, n) numbers of points, each with its
+    row in `number`, and `corners` the numbers of the points that are vertices.
     """
-    from scipy.spatial import ConvexHull, cKDTree
 
-    n = points.shape[1]
-    if n == 1:
-        return np.array([[1.0, -points.max()], [-1.0, points.min()]]), True
+    points: Floats
+    rows: Floats
+    simplices: Indices
+    number: Indices
+    corners: Indices
+
+    def certain(self) -> bool:
+        """Whether each row surely is a facet of its own.
+
+        A half-space that holds all points and touches n of them that do not lie near a smaller flat is a facet; no
+        other row is the same facet if none is nearly equal.
+        """
+        from scipy.spatial import cKDTree
+
+        if self.rows.shape[1] == 2:
+            return True
+        normals, offsets = self.rows[:, :-1], self.rows[:, -1]
+        beyond = (self.points[self.corners] @ normals.T + offsets).max()
+        corners = self.points[self.simplices]
+        edges = corners[:, 1:] - corners[:, :1]
+        lengths = np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
+        frames = np.concatenate([edges / lengths[:, :, None], normals[self.number, None]], axis=1)
+        off = np.abs((corners @ normals[self.number, :, None])[:, :, 0] + offsets[self.number, None]).max(axis=1)
+        proper = (np.abs(np.linalg.det(frames)) > _SLIVER) & (lengths.min(axis=1) > _SLIVER) & (off <= _TOUCHING)
+        touched = np.unique(self.number[proper]).size == len(self.rows)
+        return bool(beyond <= _TOUCHING and touched) and not cKDTree(self.rows).query_pairs(_ALIKE)
+
+
+def _facets(points: Floats) -> _Facets:
+    from scipy.spatial import ConvexHull
+
+    if points.shape[1] == 1:
+        ends = np.array([[points.argmax()], [points.argmin()]])
+        rows = np.array([[1.0, -points.max()], [-1.0, points.min()]])
+        return _Facets(points, rows, ends, np.arange(2), ends[:, 0])
     hull = ConvexHull(points)
-    found, number = np.unique(hull.equations, axis=0, return_inverse=True)
-    edges = points[hull.simplices[:, 1:]] - points[hull.simplices[:, :1]]
-    lengths = np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
-    frames = np.concatenate([edges / lengths[:, :, None], hull.equations[:, None, :-1]], axis=1)
-    touching = np.abs((points[hull.simplices] @ hull.equations[:, :-1, None])[:, :, 0] + hull.equations[:, -1:])
-    good = (np.abs(np.linalg.det(frames)) > _SLIVER) & (lengths.min(axis=1) > _SLIVER)
-    good &= touching.max(axis=1) <= _TOUCHING
-    holds = (points[hull.vertices] @ found[:, :-1].T + found[:, -1]).max() <= _TOUCHING
-    touched = np.unique(number.ravel()[good]).size == len(found)
-    return found, bool(holds and touched) and not cKDTree(found).query_pairs(_ALIKE)
+    rows, number = np.unique(hull.equations, axis=0, return_inverse=True)
+    return _Facets(points, rows, hull.simplices, number.ravel(), hull.vertices)
 
 
 def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
@@ -98,26 +125,27 @@ def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
         points: Floats = (oracle(directions @ axes) - inner) @ axes.T
         return points
 
-    found, certain = _refined_normals(scaled_oracle, n)
-    normals = found @ axes
+    found = _refined(scaled_oracle, n)
+    normals = found.rows[:, :-1] @ axes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return _without_doubt(normals, (normals * oracle(normals)).sum(axis=1), certain, inner, np.eye(n))
+    offsets = (normals * oracle(normals)).sum(axis=1)
+    return _without_doubt(normals, offsets, found.certain(), inner, np.eye(n))
 
 
-def _refined_normals(oracle: Oracle, n: int) -> tuple[Floats, bool]:
-    """Normals of the facets of a set of widths about one, and whether each surely is one.
+def _refined(oracle: Oracle, n: int) -> _Facets:
+    """Facets of a set of widths about one.
 
     Each round starts Qhull afresh: its incremental mode ends the whole process on a topology error.
     """
     points = _spanning_points(oracle, n)
     final: set[bytes] = set()
     while True:
-        found, certain = _facets(points)
-        fresh = found[[facet.tobytes() not in final for facet in found]]
+        found = _facets(points)
+        fresh = found.rows[[facet.tobytes() not in final for facet in found.rows]]
         corners = oracle(fresh[:, :-1])
         beyond = (corners * fresh[:, :-1]).sum(axis=1) + fresh[:, -1] > _REACHED
         if not beyond.any():
-            return found[:, :-1], certain
+            return found
         final.update(facet.tobytes() for facet in fresh[~beyond])
         points = np.vstack([points, np.unique(corners[beyond], axis=0)])
 

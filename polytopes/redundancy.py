@@ -13,6 +13,7 @@ from polytopes.support import known_nonempty
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _TOLERANCE = 1e-12  # relative to the size of b; the kernel's optima are good to some 1e-14
+_FAR = 1e6  # a row this many times farther from the inner point than most is no measure of the size of b
 _CLARKSON_FROM = 24  # rows; below, one program per row is faster
 
 
@@ -66,7 +67,10 @@ def irredundant(AT: Floats, b: Floats, inner: Floats) -> Indices:
     inner : array (n,)
         A point strictly inside.
     """
-    tolerance = _TOLERANCE * (float(np.abs(b).max()) or 1.0)
+    # A row of cancellation scaled to unit norm may lie very far out; it must not set the scale of the others.
+    slack = b - inner @ AT
+    near = slack <= _FAR * np.median(slack)
+    tolerance = _TOLERANCE * (float(np.abs(b[near]).max()) or 1.0)
     chosen = _distinct(AT, b)
     AT, b, start = np.ascontiguousarray(AT[:, chosen]), b[chosen], np.ascontiguousarray(inner)
     warm_up()

@@ -78,3 +78,12 @@ class Rows:
 def as_point(P: Rows, x: ArrayLike) -> Floats:
     """A point of the space of P; ValueError otherwise."""
     return as_vector("x", x, P.dim)
+
+
+def same_space(P: Rows, Q: Rows) -> Rows:
+    """Q itself, if it is a set in the space of P; TypeError or ValueError otherwise."""
+    if not isinstance(Q, Rows):
+        raise TypeError(f"Q is a {type(Q).__name__}; expected an HPolytope.")
+    if Q.dim != P.dim:
+        raise ValueError(f"Q has dimension {Q.dim}; expected {P.dim}, the dimension of this set.")
+    return Q

@@ -152,15 +152,24 @@ def chebyshev(P: Rows) -> Ball:
     return Ball(interior.point.copy(), max(interior.radius, 0.0))
 
 
-def outer_template(P: Rows, directions: Floats) -> tuple[Floats, Floats]:
-    """Rows ``T x <= h_P(T)`` of the smallest polytope with the given normals that contains the nonempty P.
+def outer_offsets(P: Rows, directions: Floats) -> Floats:
+    """Supports of the nonempty P along directions (k, n), +inf where unbounded.
 
-    Directions in which P is unbounded give no row.  The values are rounded outward by 128 units of the last place of
-    the terms of ``c'x``, so that the template of a flat set keeps its points.
+    Rounded outward by 128 units of the last place of the terms of ``c'x``, so that the template of a flat set keeps its
+    points.
     """
     result = maxima(P, directions)
     assert result is not None
     finite = np.isfinite(result.values)
-    normals, points = directions[finite], result.points[finite]
-    reach = np.abs(points).max(axis=1, initial=0.0)
-    return normals, result.values[finite] + _OUTWARD * reach * np.abs(normals).sum(axis=1)
+    reach = np.where(finite, np.abs(result.points).max(axis=1, initial=0.0), 0.0)
+    return result.values + _OUTWARD * reach * np.abs(directions).sum(axis=1)
+
+
+def outer_template(P: Rows, directions: Floats) -> tuple[Floats, Floats]:
+    """Rows ``T x <= h_P(T)`` of the smallest polytope with the given normals that contains the nonempty P.
+
+    Directions in which P is unbounded give no row; values are rounded outward (see `outer_offsets`).
+    """
+    offsets = outer_offsets(P, directions)
+    finite = np.isfinite(offsets)
+    return directions[finite], offsets[finite]

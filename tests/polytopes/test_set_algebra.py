@@ -228,14 +228,27 @@ def test_hull_needs_sets_of_one_dimension() -> None:
 
 
 def test_hulls_have_one_row_per_facet_with_and_without_doubt() -> None:
-    """Points in general position, integer ones with many on a facet, and slivers 1e-9 beside a facet."""
+    """Points in general position, many on a facet, the same with noise below rounding, and slivers beside a facet."""
     rng = np.random.default_rng(4)
     sphere = rng.standard_normal((60, 4))
     grid = np.array(list(itertools.product([0.0, 1.0, 2.0], repeat=4)))
     bump = np.vstack([np.array(list(itertools.product([0.0, 1.0], repeat=3))), [[0.5, 0.5, 1.0 + 1e-9]]])
-    for points, facets in ((sphere, None), (grid, 8), (grid @ rng.integers(-3, 4, (4, 4)), 8), (bump, 9)):
+    skew = grid @ rng.standard_normal((4, 4))
+    solid = np.array(list(itertools.product([0.0, 1.0, 2.0], repeat=3)))
+    noisy = solid + 1e-14 * rng.standard_normal(solid.shape)
+    for points, facets in ((sphere, None), (grid, 8), (skew, 8), (noisy, 6), (bump, 9)):
         hull = HPolytope.from_vertices(points)
         assert hull.contains(points, tol=1e-13).all()
         assert hull.b.size == hull.remove_redundancy().b.size
         assert facets is None or hull.b.size == facets
         assert hull.equals(HPolytope.from_vertices(hull.vertices()), tol=1e-11)
+
+
+def test_inner_box_of_known_sets() -> None:
+    for n in (1, 2, 5):
+        np.testing.assert_allclose(HPolytope.cross_polytope(n).inner_box(), [np.full(n, -1 / n), np.full(n, 1 / n)])
+        np.testing.assert_allclose(HPolytope.simplex(n).inner_box(), [np.zeros(n), np.full(n, 1 / n)], atol=1e-15)
+    prism = HPolytope(np.empty((0, 3)), [], [[1.0, 1.0, 0.0]], [0.0]).intersection(HPolytope.box([-1.0] * 3, [1.0] * 3))
+    lower, upper = prism.inner_box()
+    np.testing.assert_allclose(upper - lower, [0.0, 0.0, 2.0], atol=1e-15)
+    assert lower[0] + lower[1] == pytest.approx(0.0)

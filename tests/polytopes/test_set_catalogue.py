@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sets import CATALOGUE, DIMENSION, EMPTY, FACETS, UNBOUNDED, VERTICES
 
-from polytopes import EmptySetError, HPolytope, UnboundedError
+from polytopes import EmptySetError, HPolytope, UnboundedError, union_bounds
 
 EVERY = pytest.mark.parametrize("name", CATALOGUE)
 
@@ -113,3 +113,32 @@ def test_outer_template(name: str) -> None:
     T = P.outer_template(normals)
     assert T.contains(P, tol=1e-13)
     np.testing.assert_allclose(T.support(normals), P.support(normals), atol=1e-12)
+
+
+@EVERY
+def test_inner_box_lies_inside_and_no_larger_one_does(name: str) -> None:
+    P = CATALOGUE[name]
+    if name in EMPTY | UNBOUNDED:
+        with pytest.raises(EmptySetError if name in EMPTY else UnboundedError):
+            P.inner_box()
+        return
+    lower, upper = P.inner_box()
+    assert P.contains(HPolytope.box(lower, upper), tol=1e-12)
+    for j, axis in enumerate(np.eye(P.dim)):
+        assert lower[j] <= upper[j]
+        assert not P.contains(HPolytope.box(lower, upper + 1e-6 * axis), tol=1e-9 * 2.0**-9)
+        assert not P.contains(HPolytope.box(lower - 1e-6 * axis, upper), tol=1e-9 * 2.0**-9)
+
+
+@EVERY
+def test_bounds_of_a_union(name: str) -> None:
+    P = CATALOGUE[name]
+    Q = HPolytope.box(np.full(P.dim, 2.0), np.full(P.dim, 3.0))
+    normals = np.vstack([np.eye(P.dim), -np.eye(P.dim), directions(P)[:5]])
+    for chosen in (None, normals):
+        bounds = union_bounds([P, Q, HPolytope.empty(P.dim)], chosen)
+        assert bounds.contains(P, tol=0.0 if name in EMPTY else 1e-13)
+        assert bounds.contains(Q, tol=1e-13)
+        tested = normals[: 2 * P.dim] if chosen is None else normals
+        np.testing.assert_allclose(bounds.support(tested), np.maximum(P.support(tested), Q.support(tested)), atol=1e-12)
+    assert union_bounds([HPolytope.empty(P.dim)]).emptiness().status == "empty"
