@@ -8,8 +8,10 @@ set in fewer coordinates.  Then
 - "convex-hull" refines a hull of support points; the choice for dense rows, its cost goes with the facets it finds;
 - "vertices" takes the hull of projected vertices; good only while the vertices can be listed (total dimension <= 6).
 
-"auto" eliminates as long as no step forms more than 1000 rows (some 15 ms), then turns to the hull of support points if
-the shadow is bounded: measured on sets of 4 to 8 coordinates and 30 to 60 rows, see ``benchmarks/polytopes.py``.
+"auto" eliminates as long as no step forms more than 1000 rows (some 5 ms).  Beyond, a bounded set of at most 6
+coordinates with a shadow in 4 or 5 goes by its vertices (each round of the refinement is a hull in so many
+coordinates); any other with a bounded shadow by the hull of support points.  Measured on sets of 4 to 8 coordinates and
+30 to 80 rows, see ``docs/polytopes.md``.
 """
 
 from collections.abc import Sequence
@@ -30,7 +32,9 @@ from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
 METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
-_CHEAP_ROWS = 1000  # rows of one step; beyond, the hull of support points was faster in every measured case
+_CHEAP_ROWS = 1000  # rows of one step; beyond, another method was faster in every measured case
+_LISTED = 6  # coordinates up to which the vertices of dense rows are few enough to list
+_COSTLY_SHADOW = 4  # coordinates of a shadow from which one hull of all vertices beats several of support points
 
 
 def project(
@@ -108,14 +112,21 @@ def _project_body(
 
 
 def _project_automatically(P: Rows, k: int, inner: Floats, max_rows: int, outer: bool) -> tuple[Floats, Floats]:
-    """Fourier-Motzkin as long as it stays cheap; then the hull of support points, if the shadow is bounded."""
+    """Fourier-Motzkin as long as it stays cheap; then one of the hulls, if there is one."""
     try:
         return eliminate(P.A, P.b, list(range(k, P.dim)), inner, min(max_rows, _CHEAP_ROWS))
     except ProjectionLimitError:
-        axes = np.eye(k, P.dim)
-        result = maxima(P, np.vstack([axes, -axes]))
-        bounded = result is not None and np.isfinite(result.values).all()
-        return _project_body(P, k, inner, "convex-hull" if bounded else "fourier-motzkin", max_rows, outer)
+        return _project_body(P, k, inner, _method_for_dense_rows(P, k), max_rows, outer)
+
+
+def _method_for_dense_rows(P: Rows, k: int) -> str:
+    axes = np.eye(P.dim)
+    result = maxima(P, np.vstack([axes[:k], -axes[:k], axes[k:], -axes[k:]]))
+    assert result is not None  # the set is full-dimensional
+    finite = np.isfinite(result.values)
+    if not finite[: 2 * k].all():
+        return "fourier-motzkin"
+    return "vertices" if finite.all() and P.dim <= _LISTED and k >= _COSTLY_SHADOW else "convex-hull"
 
 
 def _shadow_points(P: Rows, directions: Floats) -> Floats:

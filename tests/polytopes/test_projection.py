@@ -84,6 +84,24 @@ def test_methods_agree(sparse: bool) -> None:
             assert Q.equals(results[0], tol=1e-10)
 
 
+@pytest.mark.parametrize(("keep", "height"), [(4, 2.0), (3, 2.0), (4, np.inf), (3, np.inf)])
+def test_the_choice_of_a_method_does_not_change_the_shadow(keep: int, height: float) -> None:
+    """Dense rows: vertices, convex hull, and elimination where the shadow or the set is unbounded."""
+    rng = np.random.default_rng(6)
+    A = rng.standard_normal((14, 5))
+    top = np.append(np.full(4, 2.0), height)
+    if keep == 3:
+        top[0] = height
+    A[:, np.isinf(top)] = -np.abs(A[:, np.isinf(top)])  # no row bounds such a coordinate from above
+    P = HPolytope(A, rng.uniform(0.5, 1.5, 14)).intersection(HPolytope.box([-2.0] * 5, top))
+    c = rng.standard_normal((60, keep))
+    expected = P.support(np.hstack([c, np.zeros((60, 5 - keep))]))
+    for limit in (20_000, 10):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("polytopes.projection._CHEAP_ROWS", limit)
+            np.testing.assert_allclose(P.project(range(keep)).support(c), expected, atol=1e-9)
+
+
 def test_equalities_are_used_before_elimination() -> None:
     P = HPolytope(np.vstack([np.eye(3), -np.eye(3)]), np.ones(6), [[1.0, 1.0, 1.0]], [0.5])
     Q = P.project([0, 1])
