@@ -43,5 +43,5 @@ $(VENV)/.study: pyproject.toml | $(BIN)/python
 
 $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing what the tests need into $(VENV) (about a minute)"
-	$(PIP) '.[study,compare,cdd,dev]'
+	$(PIP) '.[study,compare,dev]'
 	@touch $@ $(VENV)/.study
