@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pytest
+from fake_observers import FakeModel, FakeObserver, FakeStep, fake, log_of
 
 from polytopes import HPolytope
 from svo.isolation.architectures import ArchitectureI
@@ -15,80 +15,10 @@ from svo.log import Log
 NOTHING = np.array([])
 
 
-@dataclass
-class FakeModel:
-    n_states: int = 1
-    n_inputs: int = 1
-    n_outputs: int = 1
-    Ts: float = 0.1
-
-
-@dataclass
-class FakeStep:
-    verdict: str
-    certificate: Any
-    box: tuple[np.ndarray, np.ndarray]
-    seconds: float = 1e-4
-
-
-@dataclass
-class FakeObserver:
-    """Falls where y equals its poison, and stays falsified until reset; x moves by u; boxes are x +- 1."""
-
-    poison: float
-    model: FakeModel = field(default_factory=FakeModel)
-    undecided_at: float = 1e9
-    certified: bool = True
-    calls: list[tuple[Any, ...]] = field(default_factory=list)
-    centre: float = 0.0
-    width: float = 1.0
-    fallen: bool = False
-    started: bool = False
-
-    def update(self, y0: Any, u: Any = None, schedule: Any = None) -> FakeStep:
-        assert not self.started, "a second update without a reset"
-        self.started = True
-        self.calls.append(("update", *y0, schedule))
-        return self._answer(y0)
-
-    def step(self, u: Any, y: Any, u_next: Any = None, schedule: Any = None) -> FakeStep:
-        assert self.started
-        self.calls.append(("step", *u, *y, schedule))
-        self.centre += float(u[0])
-        return self._answer(y)
-
-    def reset(self, set: HPolytope) -> None:
-        lower, upper = set.bounding_box()
-        self.centre, self.width = float(lower[0] + upper[0]) / 2, float(upper[0] - lower[0]) / 2
-        self.fallen, self.started = False, False
-        self.calls.append(("reset", float(lower[0]), float(upper[0])))
-
-    def warm_up(self) -> float:
-        return 0.25
-
-    def _answer(self, y: Any) -> FakeStep:
-        self.fallen |= y[0] == self.poison
-        if self.fallen:
-            nan = np.array([np.nan])
-            return FakeStep("falsified", ("proof", self.poison) if self.certified else None, (nan, nan))
-        box = (np.array([self.centre - self.width]), np.array([self.centre + self.width]))
-        return FakeStep("undecided" if y[0] == self.undecided_at else "consistent", None, box)
-
-
 def bank(**options: Any) -> ArchitectureI:
     """y = 1, 2, 3 falsifies nominal, a, b; y = 9 all of them."""
     observers = [FakeObserver(p) for p in (1.0, 2.0, 3.0)]
     return ArchitectureI(observers[0], {"a": observers[1], "b": observers[2]}, **options)
-
-
-def fake(of: ArchitectureI, name: str) -> FakeObserver:
-    observer = of.observers[name]
-    assert isinstance(observer, FakeObserver)
-    return observer
-
-
-def log_of(*y: float) -> Log:
-    return Log(time=np.arange(len(y)) * 0.1, u=np.ones((len(y), 1)), y=np.array(y)[:, None])
 
 
 def test_detection_then_isolation_and_the_dead_rest() -> None:
