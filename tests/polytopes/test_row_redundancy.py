@@ -44,3 +44,12 @@ def test_rows_that_differ_by_1e_8_are_both_kept_when_both_count() -> None:
 def test_tightest_of_parallel_rows_is_kept() -> None:
     P = HPolytope([[1.0], [2.0], [4.0], [-1.0]], [1.0, 1.0, 8.0, 0.0])
     np.testing.assert_array_equal(P.remove_redundancy().bounding_box()[1], [0.5])
+
+
+def test_a_row_of_cancellation_does_not_set_the_tolerance() -> None:
+    """One elimination step of nearly opposite rows leaves 1e-13 x <= 1, at 1e13 once scaled: 1e-12 of that is 10."""
+    angles = np.arange(8) * np.pi / 4.0
+    octagon = np.vstack([np.cos(angles), np.sin(angles)])
+    AT = np.ascontiguousarray(np.hstack([octagon, [[0.6], [0.8]]]))
+    kept = irredundant(AT, np.append(np.ones(8), 1e13), np.array([0.1, 0.2]))
+    np.testing.assert_array_equal(kept, np.arange(8))
