@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from svo.isolation.record import BankRecord, Verdict
     from svo.log import Log
     from svo.model import UncertainModel, Uncertainty
+    from svo.observers.polytope import PolytopeObserver
     from svo.observers.window import WindowObserver
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "ArchitectureII",
     "BankRecord",
     "Log",
+    "PolytopeObserver",
     "UncertainModel",
     "Uncertainty",
     "Verdict",
@@ -30,6 +32,7 @@ _HOMES = {
     "ArchitectureII": "svo.isolation.architectures",
     "BankRecord": "svo.isolation.record",
     "Log": "svo.log",
+    "PolytopeObserver": "svo.observers.polytope",
     "UncertainModel": "svo.model",
     "Uncertainty": "svo.model",
     "Verdict": "svo.isolation.record",

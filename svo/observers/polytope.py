@@ -211,7 +211,7 @@ class PolytopeObserver:
             raise ValueError("schedule is missing: the model has arrays that are functions of it: pass schedule=...")
         stack = self.model.stack(schedule)
         if not np.isfinite(stack).all():
-            raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected finite numbers")
+            raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected numbers")
         lower, upper, noise = self.model.bounds(schedule)
         disturbances = self.model.disturbance_polytope
         if disturbances is None and lower.size:

@@ -94,10 +94,8 @@ class SoundRecursion:
         states = intersection(list(sets))
         both = sample.joint(states)
         rows = output_rows(self.model, sample.stack, both, sample.u, sample.y, sample.noise, self.eps)
-        if self.coupled:
-            before, known = (both,), both
-        else:
-            before, known = sets, states
+        before, known = ((both,), both) if self.coupled else (sets, states)
+        if not self.coupled:
             rows = HPolytope(rows.A[:, : self.model.n_states], rows.b)
         return _cut(known, before, rows, sample.number, self.max_facets, (memory,))
 

@@ -23,7 +23,7 @@ EXACT_FACETS = 500
 """Facets of one set beyond which exact mode gives up."""
 _EXACT_ROWS = 5_000  # rows of one step of elimination in exact mode
 _BUDGET_ROWS = 1_000  # the same under a budget; beyond, the normals at hand make a template
-_HULL_POINTS = 80  # vertices beyond which a hull in three or more dimensions has too many facets to reduce them greedily
+_HULL_POINTS = 80  # vertices beyond which a hull in three or more dimensions has too many facets to be reduced
 _INVERTIBLE = 1e4  # condition number of A up to which x is expressed by the next state
 _OUTWARD = 128.0 * float(np.finfo(np.float64).eps)
 
@@ -44,7 +44,7 @@ def transitions(stack: Array, model: UncertainModel, u: Array) -> list[tuple[Arr
     Only a Delta that enters the state at this sample, in an interval of some width, has two ends.
     """
     n, nu = model.n_states, model.n_inputs
-    ends = [
+    ends: list[list[float]] = [
         sorted(set(uncertainty.bounds)) if item[:n].any() else [uncertainty.bounds[0]]
         for item, uncertainty in zip(stack[1:], model.uncertainties, strict=True)
     ]
@@ -70,7 +70,7 @@ def hull_of_images(joint: HPolytope, maps: Sequence[tuple[Array, Array]], max_fa
 
 
 def image(joint: HPolytope, M: Array, t: Array, max_facets: int | None) -> HPolytope:
-    """{M z + t : z in joint}: x is eliminated by the equations first, then w by Fourier and Motzkin, rounded outward."""
+    """{M z + t : z in joint}, rounded outward: the equations eliminate x, Fourier and Motzkin w."""
     n = len(M)
     A, E = M[:, :n], M[:, n:]
     if E.shape[1] == 0 or np.linalg.cond(A) > _INVERTIBLE:
@@ -83,7 +83,9 @@ def image(joint: HPolytope, M: Array, t: Array, max_facets: int | None) -> HPoly
     try:
         return outward(lifted.project(range(n), "fourier-motzkin", rows, max_facets is not None))
     except ProjectionLimitError as error:
-        raise FacetLimitError(f"the projection on the next state stopped: {error}") from error
+        raise FacetLimitError(
+            f"the projection on the next state forms more than {_EXACT_ROWS} rows in one step of elimination"
+        ) from error
 
 
 def limited(P: HPolytope, max_facets: int | None) -> HPolytope:
@@ -110,7 +112,7 @@ def template(sets: Sequence[HPolytope], normals: Array, flat: Array) -> HPolytop
     rows = np.vstack([normals, flat, -flat])
     reach = np.max([reach_of(P) for P in sets], axis=0)
     room = _OUTWARD * np.abs(rows) @ reach
-    values = np.max([P.support(rows) for P in sets], axis=0)
+    values = np.max([np.asarray(P.support(rows)) for P in sets], axis=0)
     k, q = len(normals), len(flat)
     upper, lower = values[k : k + q], -values[k + q :]
     even = upper - lower <= room[k : k + q]

@@ -17,7 +17,7 @@ from svo.faults import SensorFault, Step
 
 NAMES = {
     "polytopes": ["HPolytope"],
-    "svo": ["ArchitectureI", "ArchitectureII", "UncertainModel", "Uncertainty", "WindowObserver"],
+    "svo": ["ArchitectureI", "ArchitectureII", "PolytopeObserver", "UncertainModel", "Uncertainty", "WindowObserver"],
     "svo.plant": ["Plant"],
     "svo.faults": ["ActuatorFault", "Exponential", "Intermittent", "PlantFault", "Ramp", "SensorFault", "Step"],
     "svo.indices": ["detection_indices"],
@@ -31,6 +31,10 @@ ARGUMENTS = [
     (WindowObserver.update, ["y0", "u", "schedule"]),
     (WindowObserver.step, ["u", "y", "u_next", "schedule"]),
     (WindowObserver.run, ["log"]),
+    (svo.PolytopeObserver, ["model", "initial", "horizon", "max_facets", "as_published"]),
+    (svo.PolytopeObserver.update, ["y0", "u", "schedule"]),
+    (svo.PolytopeObserver.step, ["u", "y", "u_next", "schedule"]),
+    (svo.PolytopeObserver.run, ["log"]),
     (ArchitectureI, ["nominal", "faults", "debounce", "recovery", "timeout"]),
     (ArchitectureII, ["nominal", "faults", "global_", "class_one", "debounce", "recovery", "timeout"]),
     (ArchitectureI.update, ["y0", "u", "schedule"]),
