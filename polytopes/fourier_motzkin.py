@@ -48,8 +48,9 @@ def eliminate(A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows:
     left = list(range(A.shape[1]))
     table = _pruned(np.hstack([A, b[:, None]]), inner)
     for done in range(len(columns)):
-        j = min((left.index(c) for c in columns if c in left), key=_growths(table).__getitem__)
-        formed = len(table) + int(_growths(table)[j])
+        growths = _growths(table)
+        j = min((left.index(c) for c in columns if c in left), key=growths.__getitem__)
+        formed = len(table) + int(growths[j])
         if formed > max_rows:
             raise ProjectionLimitError(
                 f"eliminating variable {done + 1} of {len(columns)} would form {formed} rows from {len(table)}, more "

@@ -242,8 +242,8 @@ class HPolytope(Rows):
     def remove_redundancy(self) -> Self:
         """The same set by a minimal description: independent equalities and one row per facet.
 
-        A row is dropped if the others imply it to within 1e-12 of the largest |b| (outward: the result contains the
-        set).  Implicit equalities become explicit, decided exactly.
+        A row is dropped if the others imply it to within 1e-12 of the largest |b|, very far rows aside (outward: the
+        result contains the set).  Implicit equalities become explicit, decided exactly.
         """
         return type(self)(*minimal_rows(self))
 

@@ -53,3 +53,8 @@ def test_a_row_of_cancellation_does_not_set_the_tolerance() -> None:
     AT = np.ascontiguousarray(np.hstack([octagon, [[0.6], [0.8]]]))
     kept = irredundant(AT, np.append(np.ones(8), 1e13), np.array([0.1, 0.2]))
     np.testing.assert_array_equal(kept, np.arange(8))
+
+
+def test_a_far_row_does_not_loosen_the_others() -> None:
+    cut = HPolytope.box([-1.0, -1.0], [1.0, 1.0]).intersection(HPolytope([[1.0, 1.0], [1.0, 0.0]], [2.0 - 1e-6, 1e9]))
+    assert cut.remove_redundancy().b.size == 5
