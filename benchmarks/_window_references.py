@@ -23,23 +23,25 @@ from svo.log import Log
 from svo.model import UncertainModel
 
 Floats = NDArray[np.float64]
-HIGHS_OPTIONS: dict[str, bool | int | str] = {
-    "output_flag": False,
-    "threads": 1,
-    "solver": "simplex",
-    "presolve": "off",  # with it, and with HiGHS' own scaling, these small programs take longer
-    "simplex_scale_strategy": 0,
-}
+Options = dict[str, bool | int | float | str]
+DEFAULT: Options = {"output_flag": False, "threads": 1}
+# The fastest that were tried. Presolve and HiGHS' own scaling cost more than they save on these small programs.
+PLAIN: Options = DEFAULT | {"solver": "simplex", "presolve": "off", "simplex_scale_strategy": 0}
+PRIMAL: Options = PLAIN | {"simplex_strategy": 4, "primal_simplex_bound_perturbation_multiplier": 0.0}
+DUAL: Options = PLAIN | {"simplex_strategy": 1, "dual_simplex_cost_perturbation_multiplier": 0.0}
 
 
 @dataclass(frozen=True)
 class Query:
-    """What an observer solves at a sample: supports of x(target) over the window base .. time, all 2 n or the first."""
+    """What an observer solves at a sample: supports of x(target) over the window base .. time.
+
+    ``programs`` are the numbers of the supports, two a state, its upper bound first.
+    """
 
     base: int
     time: int
     target: int
-    every: bool
+    programs: range
 
 
 @dataclass(frozen=True)
@@ -100,16 +102,20 @@ class HighsWindow:
         Steps that the window holds at most.
     lower, upper : (n,) arrays
         Scaled box of the state at sample 0.
+    options : dict
+        Of HiGHS.
     rebuild : bool
         Pass a new model at each sample, instead of changing the coefficients and bounds of the present one.
     """
 
-    def __init__(self, samples: ScaledSamples, steps: int, lower: Floats, upper: Floats, rebuild: bool) -> None:
+    def __init__(
+        self, samples: ScaledSamples, steps: int, lower: Floats, upper: Floats, options: Options, rebuild: bool
+    ) -> None:
         self._samples, self._slots, self._rebuild = samples, steps + 1, rebuild
         self._n, self._nw, self._ny = samples.A.shape[1], samples.E.shape[2], samples.C.shape[1]
         self._base = 0
-        self._solver = highspy.Highs()
-        for name, value in HIGHS_OPTIONS.items():
+        self._solver: Any = highspy.Highs()
+        for name, value in options.items():
             self._solver.setOptionValue(name, value)
         self._lay_out()
         self._column_lower[: self._n], self._column_upper[: self._n] = lower, upper
@@ -130,8 +136,7 @@ class HighsWindow:
             self._send(slot, 0)
             self._send(slot, 1)
             self._send(new, 2)
-            self._send_rows(states)
-            self._send_rows(self._outputs(new))
+            self._send_rows(np.concatenate([self._numbers[states], self._numbers[self._outputs(new)]]))
 
     def slide(self, base: int, lower: Floats, upper: Floats) -> None:
         """Drop the samples before ``base``, whose state lies in the scaled box."""
@@ -139,19 +144,24 @@ class HighsWindow:
             slot = k % self._slots
             for rows in (self._states(slot), self._outputs(slot)):
                 self._row_lower[rows], self._row_upper[rows] = -np.inf, np.inf
-                if not self._rebuild:
-                    self._send_rows(rows)
-            self._bound_state(slot, np.full(self._n, -np.inf), np.full(self._n, np.inf))
+            columns = self._states(slot)
+            self._column_lower[columns], self._column_upper[columns] = -np.inf, np.inf
         self._base = base
-        self._bound_state(base % self._slots, lower, upper)
+        columns = self._states(base % self._slots)
+        self._column_lower[columns], self._column_upper[columns] = lower, upper
+        if not self._rebuild:
+            self._send_rows(self._numbers)
+            states = self._numbers[: self._slots * self._n]
+            bounds = self._column_lower[states], self._column_upper[states]
+            self._solver.changeColsBounds(states.size, states, *bounds)
 
     def solve(self, query: Query) -> Floats:
-        """Upper and lower bounds of the scaled x(target), in turn; NaN where HiGHS gives no optimum."""
+        """The bounds of the scaled x(target) that are asked for; NaN where HiGHS gives no optimum."""
         if self._rebuild:
             self._solver.passModel(self._model())
         first, values = self._states(query.target % self._slots).start, []
-        for direction in range(2 * self._n if query.every else 1):
-            sign, column = 1.0 - 2.0 * (direction % 2), first + direction // 2
+        for program in query.programs:
+            sign, column = 1.0 - 2.0 * (program % 2), first + program // 2
             self._solver.changeColCost(column, sign)
             self._solver.run()
             optimal = self._solver.getModelStatus() == highspy.HighsModelStatus.kOptimal
@@ -199,6 +209,7 @@ class HighsWindow:
         self._starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=S * (n + ny)))])
         self._indices = column[self._order]
         self._row_lower, self._row_upper = np.full(S * (n + ny), -np.inf), np.full(S * (n + ny), np.inf)
+        self._numbers = np.arange(self._row_lower.size, dtype=np.int32)
         self._column_upper = np.concatenate([np.full(S * n, np.inf), np.ones(S * nw)])
         self._column_lower = -self._column_upper
 
@@ -219,31 +230,22 @@ class HighsWindow:
         rows = self._outputs(slot)
         self._row_lower[rows], self._row_upper[rows] = self._samples.lower[k], self._samples.upper[k]
 
-    def _bound_state(self, slot: int, lower: Floats, upper: Floats) -> None:
-        columns = self._states(slot)
-        self._column_lower[columns], self._column_upper[columns] = lower, upper
-        if not self._rebuild:
-            for j, (low, high) in enumerate(zip(lower.tolist(), upper.tolist(), strict=True), start=columns.start):
-                self._solver.changeColBounds(j, low, high)
-
     def _send(self, slot: int, part: int) -> None:
         values = self._values[self._where[slot][part]].tolist()
         for (row, column), value in zip(self._positions[slot][part], values, strict=True):
             self._solver.changeCoeff(row, column, value)
 
-    def _send_rows(self, rows: slice) -> None:
-        lower, upper = self._row_lower[rows].tolist(), self._row_upper[rows].tolist()
-        for i, (low, high) in enumerate(zip(lower, upper, strict=True), start=rows.start):
-            self._solver.changeRowBounds(i, low, high)
+    def _send_rows(self, rows: NDArray[np.int32]) -> None:
+        self._solver.changeRowsBounds(rows.size, rows, self._row_lower[rows], self._row_upper[rows])
 
 
 class CvxpyWindow:
-    """A window as a cvxpy problem with parameters (DPP), compiled once for its number of steps and solved by Clarabel.
+    """A window as a cvxpy problem with parameters (DPP), compiled for its steps and programs, solved by Clarabel.
 
-    All directions are copies in one problem, its columns: faster than a problem a direction.
+    All programs of a sample are copies in one problem, its columns: faster than a problem a program.
     """
 
-    def __init__(self, samples: ScaledSamples, steps: int, directions: int, target: int) -> None:
+    def __init__(self, samples: ScaledSamples, steps: int, programs: range, target: int) -> None:
         n, nw, ny = samples.A.shape[1], samples.E.shape[2], samples.C.shape[1]
         self._samples, self._steps = samples, steps
         self._A, self._E = cp.Parameter((steps * n, n)), cp.Parameter((steps * n, nw))
@@ -251,10 +253,11 @@ class CvxpyWindow:
         self._r = cp.Parameter((steps * n, 1))
         self._lower, self._upper = cp.Parameter(((steps + 1) * ny, 1)), cp.Parameter(((steps + 1) * ny, 1))
         self._box = cp.Parameter((n, 1)), cp.Parameter((n, 1))
-        self._cost = np.repeat(np.eye(n), 2, axis=1)[:, :directions] * (1.0 - 2.0 * (np.arange(directions) % 2))
-        one = np.ones((1, directions))
-        x = [cp.Variable((n, directions)) for _ in range(steps + 1)]
-        w = [cp.Variable((nw, directions)) for _ in range(steps)]
+        count = len(programs)
+        self._cost = (np.repeat(np.eye(n), 2, axis=1) * np.tile([1.0, -1.0], n))[:, programs]
+        one = np.ones((1, count))
+        x = [cp.Variable((n, count)) for _ in range(steps + 1)]
+        w = [cp.Variable((nw, count)) for _ in range(steps)]
         constraints = [x[0] >= self._box[0] @ one, x[0] <= self._box[1] @ one]
         for k in range(steps):
             part = slice(k * n, (k + 1) * n)
@@ -269,7 +272,7 @@ class CvxpyWindow:
         assert self._problem.is_dpp()
 
     def solve(self, query: Query, lower: Floats, upper: Floats) -> Floats:
-        """Upper and lower bounds of the scaled x(target), in turn, from the scaled box at the base."""
+        """The bounds of the scaled x(target) that were compiled, from the scaled box at the base."""
         s, inside, all_samples = self._samples, slice(query.base, query.time), slice(query.base, query.time + 1)
         self._A.value = s.A[inside].reshape(self._A.shape)
         self._E.value = s.E[inside].reshape(self._E.shape)
