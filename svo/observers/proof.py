@@ -133,6 +133,27 @@ class WindowCertificate:
         except _NoProof:
             return False
 
+    def proven_bound(self, sample: int, direction: Array) -> fmpq | None:
+        """Upper bound of direction'x at a sample of the window that the multipliers prove (weak duality).
+
+        Parameters
+        ----------
+        sample : int
+            Between `first` and `last`.
+        direction : (n,) array
+
+        Returns
+        -------
+        fmpq or None
+            None where the multipliers prove nothing.
+        """
+        if not _is_well_formed(self):
+            return None
+        try:
+            return -_Check(self, (sample - self.first, direction)).gap()
+        except _NoProof:
+            return None
+
 
 def _is_well_formed(c: WindowCertificate) -> bool:
     """Whether every array has its shape and finite numbers, and every interval its ends in order."""
@@ -197,8 +218,9 @@ class _NoProof(Exception):
 class _Check:
     """One exact evaluation of a certificate."""
 
-    def __init__(self, certificate: WindowCertificate) -> None:
+    def __init__(self, certificate: WindowCertificate, objective: tuple[int, Array] | None = None) -> None:
         self.c = certificate
+        self.objective = objective  # sample of the window and direction of what is subtracted from the rows
         self.total = ZERO  # lower bound of (multiplied rows - multiplied bounds) over the boxes
 
     def gap(self) -> fmpq:
@@ -207,6 +229,8 @@ class _Check:
         costate = [ZERO] * c.n
         for index in range(len(c.samples) - 1, -1, -1):
             costate = self._sample(c.samples[index], costate, index == len(c.samples) - 1)
+            if self.objective is not None and self.objective[0] == index:
+                costate = [p - exact(d) for p, d in zip(costate, self.objective[1], strict=True)]
         for r, multiplier in enumerate(c.on_arrival):
             if multiplier:
                 m = exact(multiplier)

@@ -97,8 +97,7 @@ class WindowObserver:
             If the set is empty, unbounded or of the wrong dimension.
         """
         lower, upper = finite_box(set, self.model.n_states)
-        steps = _GROWING_START if self.horizon is None else self.horizon + self._block - 1
-        self._begin(ArrivalSet(lower, upper, *joint_rows(set)), steps)
+        self._begin(ArrivalSet(lower, upper, *joint_rows(set)), self._first_steps)
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> WindowStep:
         """The first measurement, without a transition.
@@ -260,6 +259,11 @@ class WindowObserver:
         self._owner = channel_owners(model)
         self._late = output_is_disturbed(model)
 
+    @property
+    def _first_steps(self) -> int:
+        """Steps that an empty window has room for."""
+        return _GROWING_START if self.horizon is None else self.horizon + self._block - 1
+
     def _begin(self, initial: ArrivalSet, steps: int) -> None:
         """An empty window of so many steps at most, anchored at the first states."""
         self._initial = initial
@@ -347,14 +351,18 @@ class WindowObserver:
     ) -> WindowStep:
         w_old = self._last_bounds or w
         code = kernel.enter(self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
-        if code == kernel.SIGN_OPEN:
-            self._solve(kernel.CHANNELS)
-        elif code != kernel.FINE:
+        if code in _ENTRY_ERRORS:
             raise ValueError(_ENTRY_ERRORS[code].format(u=u, y=y))
+        self._settle_channels(code == kernel.SIGN_OPEN)
         kernel.complete(self._window, self._size, first, self.eps)
         self._last_bounds = w
         verdict = self._solve(kernel.ARRIVAL) if end is None else self._solve_until(end)
         return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+
+    def _settle_channels(self, sign_open: bool) -> None:
+        """Tighten the bounds of those s whose sign is open."""
+        if sign_open:
+            self._solve(kernel.CHANNELS)
 
     def _solve(self, task: int) -> VerdictName:
         """Solve the programs of a task; an empty window counts only once its certificate is proven."""

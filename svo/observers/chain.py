@@ -1,0 +1,200 @@
+"""The whole chain of a falsification: every bound from the first sample to the alarm, in exact arithmetic.
+
+What a window proves is conditional on its arrival set and on the bounds of its channels' s. Run again over the log
+with `ProvingObserver`, each of those bounds is checked when it is made: the multipliers of its program prove, by weak
+duality in rational arithmetic, a bound that is no larger. By induction the alarm then follows from the initial set, the
+model and the log alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from svo.log import Log
+from svo.observers import window_kernel as kernel
+from svo.observers.proof import WindowCertificate, certificate_of, exact
+from svo.observers.step import VerdictName
+from svo.observers.window import WindowObserver
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ChainCheck:
+    """What was found when a log was run again.
+
+    Attributes
+    ----------
+    proven : bool
+        Whether every bound up to the falsification was proven, and the falsification itself.
+    falsified_at : int or None
+        Sample of the falsification; None if the log ends without one.
+    bounds : int
+        Arrival and channel bounds that were checked.
+    unproven : tuple of str
+        Those whose proof did not hold: what and at which sample.
+    certificate : WindowCertificate or None
+    seconds : float
+    """
+
+    proven: bool
+    falsified_at: int | None
+    bounds: int
+    unproven: tuple[str, ...]
+    certificate: WindowCertificate | None
+    seconds: float
+
+
+def prove_chain(observer: WindowObserver, log: Log) -> ChainCheck:
+    """Run a log again through an observer like the given one, and prove every bound up to its falsification.
+
+    Parameters
+    ----------
+    observer : WindowObserver
+        Gives the model, the initial set, the horizon, the template and eps; it is left as it is.
+    log : Log
+    """
+    begun = perf_counter()
+    again = ProvingObserver.like(observer)
+    at = None
+    for k in range(len(log)):
+        following = log.u[k] if again.model.uses_input_in_output else None
+        schedule = log.schedule_at(k)
+        if k == 0:
+            step = again.update(log.y[0], following, schedule)
+        else:
+            step = again.step(log.u[k - 1], log.y[k], following, schedule)
+        if step.verdict == "falsified":
+            at = k
+            break
+    certificate = again.certificate
+    return ChainCheck(
+        proven=at is not None and not again.unproven,
+        falsified_at=at,
+        bounds=again.checked,
+        unproven=tuple(again.unproven),
+        certificate=certificate,
+        seconds=perf_counter() - begun,
+    )
+
+
+class ProvingObserver(WindowObserver):
+    """A window observer that proves each bound that it keeps.
+
+    Attributes
+    ----------
+    checked : int
+        Bounds so far.
+    unproven : list of str
+        Those whose multipliers do not prove them.
+    """
+
+    checked: int
+    unproven: list[str]
+
+    @classmethod
+    def like(cls, observer: WindowObserver) -> ProvingObserver:
+        """One with the settings and the initial set of another, before its first sample."""
+        again = cls.__new__(cls)
+        again._configure(observer.model, observer.horizon, observer._template, observer.eps)
+        again.checked, again.unproven = 0, []
+        again._begin(observer._initial, observer._first_steps)
+        return again
+
+    @property
+    def certificate(self) -> WindowCertificate | None:
+        """Of the falsification, once there is one."""
+        return self._falsified
+
+    def _solve(self, task: int) -> VerdictName:
+        if task != kernel.ARRIVAL:
+            return super()._solve(task)
+        clock, size, decided = self._arrays["clock"], self._size, False
+        base, time = int(clock[kernel.BASE]), int(clock[kernel.TIME])
+        for program in range(*kernel.arrival_programs.py_func(size, base, time)):
+            verdict, _ = kernel.solve(self._window, size, task, program, program + 1, kernel.PIVOT_LIMIT)
+            if verdict == kernel.EMPTY_CANDIDATE and self._prove():
+                return "falsified"
+            decided = decided or verdict == kernel.CONSISTENT
+            if time - base > size.N - size.block:
+                self._check_arrival(program, base + size.block)
+        return "consistent" if decided else self._ask_highs()
+
+    def _settle_channels(self, sign_open: bool) -> None:
+        """As the observer does, one program at a time; each bound of s is then proven."""
+        size, w = self._size, self._arrays
+        time = int(w["clock"][kernel.TIME])
+        if not size.late and self._last_bounds is None:
+            return  # the first sample opens no channel
+        v = time % (size.N + size.late)
+        for q in range(size.nq):
+            for side in range(2):
+                program = 2 * q + side
+                is_open = sign_open and w["s_lower"][v, q] < 0.0 < w["s_upper"][v, q]
+                if is_open:
+                    kernel.solve(self._window, size, kernel.CHANNELS, program, program + 1, kernel.PIVOT_LIMIT)
+                self._check_channel(v, q, side, 4 * size.nt + program if is_open else None)
+
+    def _check_arrival(self, program: int, target: int) -> None:
+        i, lower = program // 2, program % 2 == 1
+        bound = exact(-self._arrays["new_lower"][i] if lower else self._arrays["new_upper"][i])
+        direction = -self._arrays["T"][i] if lower else self._arrays["T"][i]
+        proven = self._with_multipliers(program).proven_bound(target, direction)
+        self._count(proven is not None and proven <= bound, f"arrival bound {program} of sample {target}")
+
+    def _check_channel(self, v: int, q: int, side: int, basis: int | None) -> None:
+        """s = f'(x, u, 1, w) <= s_upper, or -s <= -s_lower, by the program's multipliers or by none at all."""
+        w, size = self._arrays, self._size
+        time = int(w["clock"][kernel.TIME])
+        sign = 1.0 - 2.0 * side
+        f = sign * w["functional"][v, q]
+        bound = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q])
+        known = self._known_part(f, time, v)
+        bases = [None] if basis is None else [basis, None]
+        proofs = [self._with_multipliers(b).proven_bound(time, f[: size.n]) for b in bases]
+        holds = any(proof is not None and proof + known <= bound for proof in proofs)
+        self._count(holds, f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time}")
+
+    def _known_part(self, f: Array, time: int, v: int) -> fmpq:
+        """Largest value of what u, the constant and w contribute to f'(x, u, 1, w)."""
+        w, n, nu = self._arrays, self._size.n, self._size.nu
+        total = exact(f[n + nu])
+        for value, u in zip(f[n : n + nu], w["u"][time % (self._size.N + 1)], strict=True):
+            total += exact(value) * exact(u)
+        for value, low, high in zip(f[n + nu + 1 :], w["w_lower"][v], w["w_upper"][v], strict=True):
+            total += exact(value) * exact(high if value > 0 else low)
+        return total
+
+    def _with_multipliers(self, basis: int | None) -> WindowCertificate:
+        """The window with the multipliers of the program solved last, whose basis is given; None: without any."""
+        w = self._arrays
+        w["farkas"][:] = 0.0
+        if basis is not None:
+            k = int(w["k"][basis])
+            w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
+        return certificate_of(w, self._size, self._arrival())
+
+    def _count(self, holds: bool, what: str) -> None:
+        self.checked += 1
+        if not holds:
+            self.unproven.append(what)
+
+
+def chain_of(bank: Any, name: str, log: Log) -> ChainCheck:
+    """`prove_chain` for one observer of a bank, by name.
+
+    Raises
+    ------
+    ValueError
+        If the bank has no window observer of that name.
+    """
+    observer = bank.observers.get(name)
+    if not isinstance(observer, WindowObserver):
+        raise ValueError(f"the bank has no window observer {name!r}; it has {', '.join(bank.observers)}")
+    return prove_chain(observer, log)

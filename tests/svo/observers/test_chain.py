@@ -1,0 +1,88 @@
+"""The proof from the first sample to the alarm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from polytopes import HPolytope
+from svo import UncertainModel, Uncertainty, WindowObserver
+from svo.log import Log
+from svo.observers.chain import chain_of, prove_chain
+from tests.svo.observers.random_plants import random_plant
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_every_bound_of_a_random_plant_is_proven(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    model = random_plant(rng, largest=3)
+    x0 = rng.uniform(-1.0, 1.0, model.n_states)
+    log = model.simulate(x0, rng.normal(size=(16, model.n_inputs)), rng, corners=bool(rng.random() < 0.5))
+    y = log.y.copy()
+    y[rng.random(y.shape) < 0.1] = np.nan
+    y[12:] += 5.0 + 5.0 * np.abs(np.nan_to_num(y[12:]))  # nothing healthy explains this
+    template = "box" if rng.random() < 0.6 else rng.normal(size=(1, model.n_states))
+    horizon = int(rng.choice([1, 3, 5]))
+    observer = WindowObserver(model, HPolytope.box(x0 - 0.5, x0 + 0.5), horizon, template)
+    bad = Log(log.time, log.u, y)
+    verdicts = observer.run(bad).verdicts
+    chain = prove_chain(observer, bad)
+    assert chain.unproven == ()
+    first = verdicts.index("falsified") if "falsified" in verdicts else None
+    assert chain.falsified_at == first
+    assert chain.proven == (first is not None)
+
+
+def test_a_bound_that_is_too_tight_is_not_proven(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Falsify the arrival sets by hand: the chain must notice, though every window proof still verifies."""
+    from svo.observers.chain import ProvingObserver
+
+    model = UncertainModel([[0.9]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.1])
+    rng = np.random.default_rng(0)
+    log = model.simulate([0.2], np.zeros((30, 0)), rng)
+    honest = ProvingObserver._check_arrival
+
+    def check_after_cheating(self: ProvingObserver, program: int, target: int) -> None:
+        if program == 0:
+            self._arrays["new_upper"][0] -= 1e-9
+        honest(self, program, target)
+
+    monkeypatch.setattr(ProvingObserver, "_check_arrival", check_after_cheating)
+    chain = prove_chain(WindowObserver(model, HPolytope.box([-1.0], [1.0]), horizon=3), log)
+    assert not chain.proven
+    assert any("arrival bound 0" in what for what in chain.unproven)
+
+
+def test_bounds_of_channels_are_counted_and_proven() -> None:
+    model = UncertainModel(
+        [[0.95, 0.1], [-0.1, 0.9]], None, np.eye(2), E=np.eye(2), w=[0.02, 0.02], n=[0.05, 0.05],
+        uncertainties=[Uncertainty(A=[[0.0, 0.0], [0.2, 0.1]])],
+    )  # fmt: skip
+    rng = np.random.default_rng(1)
+    log = model.simulate([0.3, -0.3], np.zeros((25, 0)), rng)
+    y = log.y.copy()
+    y[20:, 0] += 1.0
+    chain = prove_chain(WindowObserver(model, HPolytope.box([-1, -1], [1, 1]), horizon=4), Log(log.time, log.u, y))
+    assert chain.proven
+    assert chain.falsified_at == 20
+    assert chain.bounds >= 40  # two of the channel at each transition alone
+    assert chain.certificate is not None
+    assert chain.certificate.verify()
+
+
+def test_a_healthy_log_proves_its_bounds_and_no_alarm() -> None:
+    model = UncertainModel([[0.9]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.1])
+    log = model.simulate([0.2], np.zeros((20, 0)), np.random.default_rng(0))
+    chain = prove_chain(WindowObserver(model, HPolytope.box([-1.0], [1.0])), log)
+    assert (chain.proven, chain.falsified_at, chain.unproven) == (False, None, ())
+
+
+def test_the_observer_of_a_bank_is_found_by_name() -> None:
+    class Bank:
+        observers: dict[str, WindowObserver] = {}  # noqa: RUF012
+
+    with pytest.raises(ValueError, match="no window observer 'moon'"):
+        chain_of(Bank(), "moon", Log(np.zeros(1), np.zeros((1, 0)), np.zeros((1, 1))))
