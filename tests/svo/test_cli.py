@@ -206,3 +206,11 @@ def test_a_row_of_the_run_table_can_be_simulated_and_verified(registered_tank: s
     assert svo("verify", tmp_path / "out" / "alarms.jsonl", "--log", log).exit_code == 0
     found = json.loads(svo("detect", "tank", log, "--json").stdout)
     assert found["detected_s"] == row.first_alarm_s
+
+
+def test_the_whole_chain_is_proven(log: Path, tmp_path: Path) -> None:
+    assert svo("detect", "tank", log, "--out", tmp_path).exit_code == 0
+    result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
+    assert result.exit_code == 0, result.output
+    assert all("proven from the first sample" in check["reason"] for check in json.loads(result.stdout))
+    assert "leave --log out" in one_line(svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--log", log))
