@@ -107,7 +107,7 @@ class WindowObserver:
         y0 : (ny,) array
             NaN = that sensor is missing.
         u : (nu,) array, optional
-            Needed only if D or a D_i is not zero.
+            Needed where `step` needs ``u_next``.
         schedule : optional
             Scheduling value at this sample.
         """
@@ -115,7 +115,7 @@ class WindowObserver:
         if self._started:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
         y = self._outputs(y0)
-        inputs = self._inputs("u", u, self.model.uses_input_in_output)
+        inputs = self._inputs("u", u, self._wants_next_input)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
         return self._sample(True, np.zeros(self.model.n_inputs), inputs, y, stack, noise, (w_lower, w_upper), begun)
 
@@ -135,7 +135,8 @@ class WindowObserver:
         y : (ny,) array
             NaN = that sensor is missing; all NaN = prediction only.
         u_next : (nu,) array, optional
-            u(k+1); needed only if D or a D_i is not zero.
+            u(k+1); needed only if D or a D_i is not zero, or if the output depends on w or an uncertainty (F, C_i,
+            c_i, F_i) while some B_i is not zero.
         schedule : optional
             Scheduling value at the sample of y; it also gives the matrices of the next transition.
         deadline : float, optional
@@ -155,7 +156,7 @@ class WindowObserver:
             return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
         outputs = self._outputs(y)
         inputs = self._inputs("u", u, True)
-        following = self._inputs("u_next", u_next, self.model.uses_input_in_output)
+        following = self._inputs("u_next", u_next, self._wants_next_input)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
         if not self._started:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
@@ -203,7 +204,7 @@ class WindowObserver:
         """All samples of a log, with the box of the state at each."""
         steps, lower, upper = [], [], []
         for k in range(len(log)):
-            following = log.u[k] if self.model.uses_input_in_output else None
+            following = log.u[k] if self._wants_next_input else None
             schedule = log.schedule_at(k)
             step = (
                 self.update(log.y[k], following, schedule)
@@ -258,6 +259,9 @@ class WindowObserver:
         self._template = template
         self._owner = channel_owners(model)
         self._late = output_is_disturbed(model)
+        # Channels that the output may share are bounded at its sample, so what u says of them must be known then.
+        driven = any(callable(u.B) or (u.B is not None and bool(np.any(u.B))) for u in model.uncertainties)
+        self._wants_next_input = model.uses_input_in_output or (self._late and driven)
 
     @property
     def _first_steps(self) -> int:
@@ -324,7 +328,7 @@ class WindowObserver:
         if u is None:
             raise ValueError(
                 f"{name} is missing; expected shape ({size},)"
-                + (", since D or a D_i is not zero" if name != "u" else "")
+                + (", since the output shares D, a D_i or a channel with the input" if name != "u" else "")
             )
         array = np.asarray(u, dtype=float)
         if array.shape != (size,):
