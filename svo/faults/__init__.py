@@ -1,6 +1,7 @@
 """Fault objects that both corrupt a simulation and give the observer's model of the fault."""
 
 from svo.faults.actuator import ActuatorFault, ActuatorLaw
+from svo.faults.pair import FaultPair, pairs
 from svo.faults.plant import PlantFault
 from svo.faults.profiles import Exponential, Intermittent, Profile, Ramp, Step
 from svo.faults.sensor import SensorFault, SensorLaw
@@ -9,6 +10,7 @@ __all__ = [
     "ActuatorFault",
     "ActuatorLaw",
     "Exponential",
+    "FaultPair",
     "Intermittent",
     "PlantFault",
     "Profile",
@@ -16,4 +18,5 @@ __all__ = [
     "SensorFault",
     "SensorLaw",
     "Step",
+    "pairs",
 ]

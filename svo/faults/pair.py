@@ -1,0 +1,72 @@
+"""Two faults at once (Rosa and Silvestre 2013, Remark 3: simultaneous faults need models of their own)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+from svo.faults.actuator import ActuatorFault
+from svo.faults.plant import PlantFault
+from svo.faults.sensor import SensorFault
+from svo.model import UncertainModel
+
+Fault = ActuatorFault | PlantFault | SensorFault
+
+
+@dataclass(frozen=True)
+class FaultPair:
+    """Two faults that act together.
+
+    Where both act on one channel the first acts first: of two actuator faults the second one moves what the
+    first one achieves, of two sensor faults the second one reads what the first one gives.
+    """
+
+    first: Fault
+    second: Fault
+
+    def __post_init__(self) -> None:
+        for name in ("first", "second"):
+            if not isinstance(getattr(self, name), Fault):
+                raise TypeError(f"{name} is a {type(getattr(self, name)).__name__}; expected a fault of svo.faults")
+
+    def model(self, nominal: UncertainModel) -> UncertainModel:
+        """The observer's model of the pair; it contains ``nominal`` and the model of each fault alone."""
+        for fault in self._in_order():
+            nominal = fault.model(nominal)
+        return nominal
+
+    def _in_order(self) -> list[Fault]:
+        """Innermost first: the plant, then what drives it, then what measures it, so that no product is lost."""
+        both = (self.first, self.second)
+        # An actuator's model acts on the command, before the faults that the model has already.
+        actuators = [f for f in reversed(both) if isinstance(f, ActuatorFault)]
+        sensors = [f for f in both if isinstance(f, SensorFault)]
+        return [*(f for f in both if isinstance(f, PlantFault)), *actuators, *sensors]
+
+
+def pairs(faults: Mapping[str, Fault]) -> dict[str, FaultPair]:
+    """All pairs of simultaneous faults, named "first + second", in the order of ``faults``.
+
+    A pair's model contains those of its faults. Beside them in a bank, a single fault is therefore isolated only
+    if the bank has neither of its pairs; run the pairs when every single fault is falsified.
+
+    Parameters
+    ----------
+    faults : mapping of str to fault
+        At least two.
+
+    Raises
+    ------
+    ValueError
+        For fewer than two faults, or names that make two pairs of one name.
+    """
+    if len(faults) < 2:
+        raise ValueError(f"faults has {len(faults)} entries; expected at least two faults to pair")
+    found: dict[str, FaultPair] = {}
+    for first, second in combinations(faults, 2):
+        name = f"{first} + {second}"
+        if name in found:
+            raise ValueError(f"faults make two pairs of the name {name!r}; expected names without ' + ' in them")
+        found[name] = FaultPair(faults[first], faults[second])
+    return found
