@@ -64,12 +64,11 @@ def prove_chain(observer: WindowObserver, log: Log) -> ChainCheck:
     again = ProvingObserver.like(observer)
     at = None
     for k in range(len(log)):
-        following = log.u[k] if again.model.uses_input_in_output else None
         schedule = log.schedule_at(k)
         if k == 0:
-            step = again.update(log.y[0], following, schedule)
+            step = again.update(log.y[0], log.u[0], schedule)
         else:
-            step = again.step(log.u[k - 1], log.y[k], following, schedule)
+            step = again.step(log.u[k - 1], log.y[k], log.u[k], schedule)
         if step.verdict == "falsified":
             at = k
             break
