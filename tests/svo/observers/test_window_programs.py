@@ -1,0 +1,61 @@
+"""The compiled dual simplex against HiGHS, on the very rows of random windows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from polytopes import HPolytope
+from svo import WindowObserver
+from svo.observers import window_kernel as kernel
+from tests.svo.observers.random_plants import random_plant
+
+
+def flown(rng: np.random.Generator, samples: int, **settings: object) -> WindowObserver:
+    model = random_plant(rng)
+    x0 = rng.uniform(-1.0, 1.0, model.n_states)
+    log = model.simulate(x0, rng.normal(size=(samples, model.n_inputs)), rng)
+    observer = WindowObserver(model, HPolytope.box(x0 - 1.0, x0 + 1.0), **settings)  # type: ignore[arg-type]
+    observer.run(log)
+    return observer
+
+
+def highs(observer: WindowObserver, cost: np.ndarray) -> float:
+    w = observer._arrays
+    rows, bounds = np.vstack([w["G"], -w["G"]]), np.concatenate([w["upper"], -w["lower"]])
+    result = linprog(-cost, A_ub=rows, b_ub=bounds, bounds=(-1.0, 1.0), method="highs")
+    assert result.status == 0
+    return -result.fun
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_supports_of_the_newest_state_are_optimal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    observer = flown(rng, 14, horizon=int(rng.choice([1, 3, 5, 8, 10])))
+    w, n = observer._arrays, observer.model.n_states
+    at = int(w["clock"][kernel.TIME]) % (observer._size.N + 1)
+    for direction in rng.normal(size=(3, n)):
+        w["query"][:] = direction
+        observer._solve(kernel.QUERY)
+        cost = direction @ w["psi"]
+        expected = float(direction @ w["phi"][at]) + highs(observer, cost)
+        size = np.abs(cost).sum() + np.abs(direction) @ w["mag"][at]
+        assert expected - 1e-8 * size <= w["answer"][0] <= expected + 1e-7 * size
+
+
+@pytest.mark.parametrize("limit", [0, 1, 5])
+def test_a_program_that_is_stopped_early_is_wider_and_never_narrower(limit: int) -> None:
+    rng = np.random.default_rng(7)
+    observer = flown(rng, 14, horizon=5)
+    w = observer._arrays
+    for direction in rng.normal(size=(5, observer.model.n_states)):
+        w["query"][:] = direction
+        answers = []
+        for pivots in (limit, kernel.PIVOT_LIMIT):
+            kernel.solve(observer._window, observer._size, kernel.QUERY, 0, 1, pivots)
+            answers.append(float(w["answer"][0]))
+        assert answers[1] <= answers[0] + 1e-12 * abs(answers[0])
