@@ -48,7 +48,7 @@ class Bank(ABC):
     # -- samples -----------------------------------------------------------------------------------
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Verdict:
-        """The first measurement, without a transition; ``u`` is needed only if D or a D_i is not zero.
+        """The first measurement, without a transition; ``u`` where an observer needs it.
 
         Raises
         ------
