@@ -44,7 +44,7 @@ class PolytopeObserver:
         facet budget longer images recover part of what the reduction gave away.
     max_facets : int or None
         Sets are reduced outward to so many facets, at least twice their dimension (n, or n + nw where w enters the
-        output). None = exact, until a set has more than 500 facets.
+        output). None = exact, until a set has more than 500 facets or its elimination forms more than 5000 rows.
     eps : float
         Every measurement row is widened by eps (|y| + |C||x|max + |D u| + |c| + |F| wmax + n), for the rounding
         of the data.
@@ -148,7 +148,7 @@ class PolytopeObserver:
         ValueError
             For a wrong shape, or an infinite or missing value. The observer is unchanged.
         FacetLimitError
-            In exact mode, when a set has too many facets. The observer is unchanged.
+            In exact mode, when a set has too many facets, or Qhull fails on it. The observer is unchanged.
         UndecidedError
             If a set is too thin for any linear program to settle. The observer is unchanged.
         """
@@ -169,6 +169,8 @@ class PolytopeObserver:
 
     def run(self, log: Log) -> PolytopeRecord:
         """All samples of a log, with the box of the state at each."""
+        if len(log) == 0:
+            raise ValueError("log has no samples; expected at least one")
         steps = []
         for k in range(len(log)):
             following = log.u[k] if self.model.uses_input_in_output else None

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 EXACT_FACETS = 500
 """Facets of one set beyond which exact mode gives up."""
-_EXACT_ROWS = 5_000  # rows of one step of elimination in exact mode
+_EXACT_ROWS = 5_000  # the same for the rows that one step of elimination forms
 _BUDGET_ROWS = 1_000  # the same under a budget; beyond, the normals at hand make a template
 _HULL_POINTS = 80  # vertices beyond which a hull in three or more dimensions has too many facets to be reduced
 _INVERTIBLE = 1e4  # condition number of A up to which x is expressed by the next state
@@ -145,7 +145,8 @@ def hull_normals(images: Sequence[HPolytope], max_facets: int | None) -> tuple[A
         try:
             hull = convex_hull(images)
         except (QhullError, UndecidedError) as error:
-            raise FacetLimitError(f"the hull over the vertices of Delta failed: {error}") from error
+            reason = str(error).splitlines()[0]
+            raise FacetLimitError(f"the hull over the vertices of Delta was not found ({reason})") from error
         return hull.A, hull.C
     try:
         points = np.vstack([P.vertices() for P in images])
