@@ -8,6 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from svo.calibration import Calibration, calibrate
+    from svo.distinguish import Distinguishability, distinguishability
     from svo.isolation.architectures import ArchitectureI, ArchitectureII
     from svo.isolation.record import BankRecord, Verdict
     from svo.log import Log
@@ -19,24 +21,32 @@ __all__ = [
     "ArchitectureI",
     "ArchitectureII",
     "BankRecord",
+    "Calibration",
+    "Distinguishability",
     "Log",
     "PolytopeObserver",
     "UncertainModel",
     "Uncertainty",
     "Verdict",
     "WindowObserver",
+    "calibrate",
+    "distinguishability",
 ]
 
 _HOMES = {
     "ArchitectureI": "svo.isolation.architectures",
     "ArchitectureII": "svo.isolation.architectures",
     "BankRecord": "svo.isolation.record",
+    "Calibration": "svo.calibration",
+    "Distinguishability": "svo.distinguish",
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",
     "UncertainModel": "svo.model",
     "Uncertainty": "svo.model",
     "Verdict": "svo.isolation.record",
     "WindowObserver": "svo.observers.window",
+    "calibrate": "svo.calibration",
+    "distinguishability": "svo.distinguish",
 }
 
 

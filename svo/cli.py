@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from svo.alarms import Alarm, AlarmCheck
     from svo.detect import Detection
+    from svo.isolability import Isolability
     from svo.log import Log
     from svo.plant import Plant
     from svo.study.summary import ConditionSummary
@@ -240,6 +241,77 @@ def verify(
         raise typer.Exit(1)
 
 
+@app.command()
+def distinguish(
+    plant: PlantName,
+    horizon: Annotated[int, typer.Option(min=1, help="Largest number of samples after the fault to search.")] = 100,
+    noise: NoiseName = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")] = 0,
+    as_json: AsJson = False,
+) -> None:
+    """Tell, without a study, which faults a plant's observers cannot mistake, and after how many samples.
+
+    Each fault, at a stated size, is compared with each observer's model along one simulated flight without a fault:
+    its inputs and schedule are kept, all disturbances, noises and uncertainties are free within their bounds. The
+    number is that of the samples, the first faulty one included, after which an observer that keeps all data is
+    falsified for certain; by luck it may be sooner.
+
+    \b
+    Example:
+      svo distinguish eclipse --horizon 50 --noise quiet
+    """
+    with _one_line_errors():
+        from svo.isolability import isolability
+        from svo.plant import load_plant
+        from svo.progress import progress
+        from svo.study.configuration import check_noise
+
+        the_plant = load_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        _announce(PREPARING)
+        with progress("Pairs") as update:
+            answer = isolability(the_plant, noise, horizon, seed, progress=update)
+        if as_json:
+            _print_json(answer.to_dict())
+        else:
+            _print_isolability(answer)
+
+
+@app.command()
+def calibrate(
+    plant: PlantName,
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="CSV file of a flight without faults.")],
+    noise: NoiseName = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the smallest widening of the nominal model's bounds that explains a log without faults.
+
+    For a healthy log on which `svo detect` finds a fault: it names each bound of a sensor's noise or of a disturbance
+    that is too narrow, by how much, and the sample from which on it must be wider.
+
+    \b
+    Example:
+      svo calibrate eclipse log.csv --noise quiet
+    """
+    with _one_line_errors():
+        from svo.log_calibration import calibrate_log
+        from svo.log_file import read_log
+        from svo.plant import load_plant
+        from svo.study.configuration import check_noise
+
+        the_plant = load_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        samples = read_log(log, the_plant.columns, the_plant.Ts)
+        _announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
+        found = calibrate_log(the_plant, samples, noise)
+        if as_json:
+            _print_json(found.to_dict())
+        else:
+            typer.echo(found.to_text())
+
+
 @contextmanager
 def _one_line_errors() -> Iterator[None]:
     """What a user can cause becomes one line on standard error and exit code 1."""
@@ -368,6 +440,23 @@ def _print_detection(found: Detection) -> None:
     undecided = int(found.record.undecided.sum())
     if undecided:
         typer.echo(f"    undecided answers: {undecided}")
+
+
+def _print_isolability(answer: Isolability) -> None:
+    from rich.table import Table
+
+    table = Table(title=f"Samples until an observer is surely falsified ({answer.noise} noise)")
+    table.add_column("plant with fault")
+    observers = list(next(iter(answer.answers.values())))
+    for name in observers:
+        table.add_column(f"observer {name}")
+    for fault, description in answer.faults.items():
+        table.add_row(f"{fault}: {description}", *(answer.cell(fault, name) for name in observers))
+    _console().print(table)
+    typer.echo(
+        f"Inputs and schedule: the fault-free flight of seed {answer.seed}, from {answer.fault_time:g} s on. "
+        "The first faulty sample counts as 1; an observer with a short window may need more."
+    )
 
 
 def _print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:

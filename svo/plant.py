@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from svo.isolation.architectures import ArchitectureI
 from svo.log import Log
+from svo.model import UncertainModel
 
 HEALTHY = "none"
 
@@ -95,6 +96,31 @@ class Plant(Protocol):
 
     def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
         """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
+        ...
+
+
+@dataclass(frozen=True)
+class StatedFault:
+    """A plant with one fault of one size, held from its first sample on.
+
+    Attributes
+    ----------
+    description : str
+        The fault and its size, for people.
+    model : UncertainModel
+        The plant with exactly this fault; unlike an observer's model it does not contain the fault-free plant.
+    """
+
+    description: str
+    model: UncertainModel
+
+
+@runtime_checkable
+class StatesFaults(Protocol):
+    """What a `Plant` offers besides if it can tell, before a study, which faults its bank can isolate."""
+
+    def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
+        """Each fault at the size of its first profile, with the bounds of a noise set."""
         ...
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED
 from aircraft.eclipse.models import ScheduledModel, read_bounds
@@ -15,11 +17,14 @@ from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
+from svo.faults import SensorFault
 from svo.isolation.architectures import ArchitectureI
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
-from svo.plant import Column, Columns, Reference
+from svo.plant import Column, Columns, Reference, StatedFault
+
+Array = NDArray[np.float64]
 
 REFERENCE: Mapping[tuple[str, str], Reference] = MappingProxyType(
     {
@@ -54,6 +59,15 @@ COLUMNS = Columns(
 # Any state of a flight between 25 and 55 m/s; the first measurement cuts it down to the sensors' bounds.
 INITIAL_LOWER = (15.0, -15.0, -0.8, -2.0)
 INITIAL_UPPER = (65.0, 25.0, 0.8, 2.0)
+
+
+STATED: Mapping[str, str] = MappingProxyType(
+    {
+        "alpha": "alpha reads 3 deg too much",
+        "elevator": "half of the elevator's effect is lost",
+        "dynamics": "M_u is 30 % larger",
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -105,6 +119,23 @@ class Eclipse:
             models[name] = fault.model(scheduled.model(noise, bounds[name]))
         return models
 
+    def stated_faults(self, noise: str) -> dict[str, StatedFault]:
+        """The aircraft with each fault at the size of its step: alpha + 3 deg, half the elevator, 1.3 M_u."""
+        models, stated = self.models(noise), {}
+        for name, description in STATED.items():
+            fault = self.scenarios.fault(name, "step")
+            if isinstance(fault, SensorFault):
+                bias = np.zeros(models["nominal"].n_outputs)
+                bias[fault.where] = fault.magnitude
+                healthy = self.scenarios.model.model(noise, read_bounds()[noise][name])
+                model = healthy.replace(c=_shifted(self.scenarios.model.blocks.block("c"), bias))
+            else:
+                size = float(fault.delta(FAULT_TIME))
+                *others, last = models[name].uncertainties
+                model = models[name].replace(uncertainties=[*others, replace(last, bounds=(size, size))])
+            stated[name] = StatedFault(description, model)
+        return stated
+
     def bank(self, noise: str) -> ArchitectureI:
         """A fresh isolation bank of window observers with box templates."""
         initial = HPolytope.box(INITIAL_LOWER, INITIAL_UPPER)
@@ -114,6 +145,10 @@ class Eclipse:
     def scheduler(self) -> AirspeedFilter:
         """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""
         return AirspeedFilter(self.Ts, DESIGN_AIRSPEED)
+
+
+def _shifted(offset: Callable[[Any], Array], shift: Array) -> Callable[[Any], Array]:
+    return lambda schedule: offset(schedule) + shift
 
 
 def eclipse(reference: str = "absolute") -> Eclipse:

@@ -1,0 +1,69 @@
+"""Calibration of a plant's nominal model on a log file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo.calibration import Calibration, calibrate
+from svo.log import Log
+from svo.plant import Plant
+
+
+@dataclass(frozen=True)
+class LogCalibration:
+    """What is too narrow in a plant's nominal model, with the log's own times (K,) [s]."""
+
+    plant: str
+    noise: str
+    time: NDArray[np.float64]
+    result: Calibration
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "plant": self.plant,
+            "noise": self.noise,
+            "samples": len(self.time),
+            "smallest": self.result.smallest,
+            "chosen": list(self.result.chosen),
+            "widenings": [
+                {
+                    "bound": w.bound,
+                    "amount": w.amount,
+                    "relative": w.relative,
+                    "sample": w.sample,
+                    "time_s": float(self.time[w.sample]),
+                }
+                for w in self.result.widenings
+            ],
+        }
+
+    def to_text(self) -> str:
+        """For people: one line a bound."""
+        samples = f"all {len(self.time)} samples ({self.noise} noise)"
+        if not self.result.widenings:
+            return f"Nothing to widen: the nominal model explains {samples}."
+        kind = "The smallest" if self.result.smallest else "A sufficient"
+        lines = [
+            f"    {w.bound}: + {w.amount:.4g} ({100 * w.relative:.3g} % of the bound), "
+            f"first needed at {self.time[w.sample]:g} s (sample {w.sample})"
+            for w in self.result.widenings
+        ]
+        return "\n".join([f"{kind} widening with which the nominal model explains {samples}, in model units:", *lines])
+
+
+def calibrate_log(plant: Plant, log: Log, noise: str) -> LogCalibration:
+    """Calibrate the model of a bank's nominal observer; the plant's own scheduler makes the schedule from y."""
+    nominal, scheduler = plant.bank(noise).observers["nominal"], plant.scheduler()
+    values = [scheduler(y) for y in log.y]
+    schedule = None if values[0] is None else np.array(values, dtype=float)
+    scheduled = Log(time=log.time, u=log.u, y=log.y, schedule=schedule)
+    # Nothing measured yet, so this is the set that the observer starts from.
+    start = nominal.update(np.full(log.y.shape[1], np.nan), u=log.u[0], schedule=scheduled.schedule_at(0)).box
+    result = calibrate(nominal.model, scheduled, HPolytope.box(*start))
+    return LogCalibration(plant.name, noise, log.time, result)
