@@ -171,7 +171,7 @@ class ArchitectureII(Bank):
         """Start the observers that the logic asks for from the global set of this sample."""
         if GLOBAL in falsified and self._global_set is None:
             return self._logic.give_up(state, k)
-        self._keep_global_set(state, steps, falsified, now)
+        self._keep_global_set(state, steps, now)
         while state.restart:
             fallen = self._start(state, steps, now)
             if not fallen:
@@ -180,13 +180,11 @@ class ArchitectureII(Bank):
             state = self._logic.advance(state, k, fallen, undecided=(*self.names, GLOBAL))
         return state
 
-    def _keep_global_set(
-        self, state: LogicState, steps: dict[str, Step], falsified: Collection[str], now: Sample
-    ) -> None:
+    def _keep_global_set(self, state: LogicState, steps: dict[str, Step], now: Sample) -> None:
         if GLOBAL in state.restart:
             assert self._global_set is not None
             self._global_set = self._predict_from(GLOBAL, self._global_set, now).set
-        elif GLOBAL in steps and GLOBAL not in falsified and (state.restart or self._logic.may_restart):
+        elif GLOBAL in steps and (state.restart or self._logic.may_restart):
             self._global_set = steps[GLOBAL].set
 
     def _start(self, state: LogicState, steps: dict[str, Step], now: Sample) -> list[str]:

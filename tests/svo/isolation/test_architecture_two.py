@@ -159,6 +159,12 @@ def test_a_fault_that_goes_away_restarts_everybody_from_the_global_set() -> None
     assert np.isnan(record.seconds[8, 2:]).all()
 
 
+def test_a_fall_at_the_start_of_class_two_counts_no_sample_twice() -> None:
+    b = bank(recovery=2)
+    fake(b, "c").poison = 1.0
+    assert b.run(log_of(0.0, 1.0, 0.0, 0.0)).states == ("nominal", "detected", "detected", "nominal")
+
+
 def test_boxes_can_be_read_at_the_sample_of_the_restart() -> None:
     b = bank(recovery=1)
     b.update([0.0])
