@@ -1,12 +1,12 @@
 """The LP kernel against warm HiGHS and SciPy: many linear programs over one polytope, same seeded inputs.
 
-Run with ``python -m benchmarks.lp_kernel``.  Times are microseconds per program, best of several repetitions of the
+Run with ``python -m benchmarks.lp_kernel``.  Times are CPU microseconds per program, best of several repetitions of the
 whole batch; the agreement column is the largest relative difference of the optimal values.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from rich.table import Table
 from scipy.optimize import linprog
 
 from polytopes import HPolytope, warm_up
+from polytopes import simplex_kernel as kernel
 from polytopes.highs import HighsProgram
 
 Floats = NDArray[np.float64]
@@ -43,12 +44,12 @@ def random_polytope(variables: int, rows: int, seed: int) -> HPolytope:
 
 
 def seconds(task: Callable[[], object], repetitions: int) -> float:
-    """Shortest of several runs."""
+    """Shortest CPU time of several runs (the machine may be busy)."""
     times = []
     for _ in range(repetitions):
-        start = perf_counter()
+        start = process_time()
         task()
-        times.append(perf_counter() - start)
+        times.append(process_time() - start)
     return min(times)
 
 
@@ -75,7 +76,7 @@ def measure(variables: int, rows: int, seed: int = 0) -> Row:
 
 
 def measure_box(variables: int, rows: int) -> tuple[float, float, float]:
-    """Microseconds of construction, of emptiness (with preparation) and of the bounding box afterwards."""
+    """Microseconds from Python: construction, emptiness (with preparation) and the bounding box afterwards."""
     P = random_polytope(variables, rows, 0)
     P.emptiness()
     A, b = P.A.copy(), P.b.copy()
@@ -84,10 +85,19 @@ def measure_box(variables: int, rows: int) -> tuple[float, float, float]:
     return 1e6 * construct, 1e6 * decide, 1e6 * seconds(P.bounding_box, 200)
 
 
+def measure_box_in_kernel(variables: int, rows: int) -> tuple[float, float]:
+    """Microseconds in compiled code: a largest ball, and the support along the axes."""
+    program = random_polytope(variables, rows, 0).program
+    AT, b, centre = program.AT, program.rhs, program.interior.point
+    axes = np.vstack([np.eye(variables), -np.eye(variables)])
+    ball = seconds(lambda: kernel.interior(AT, b, program.norms, np.zeros(variables), 10.0), 200)
+    return 1e6 * ball, 1e6 * seconds(lambda: kernel.supports(AT, b, centre, axes), 200)
+
+
 def main() -> None:
     """Measure and print."""
     warm_up()
-    table = Table(title=f"LP kernel, {PROGRAMS} directions over one polytope, microseconds per program")
+    table = Table(title=f"LP kernel, {PROGRAMS} directions over one polytope, CPU microseconds per program")
     for column in ("variables", "rows", "kernel", "kernel, one call each", "HiGHS, warm", "SciPy linprog",
                    "HiGHS / kernel", "SciPy / kernel", "largest difference"):  # fmt: skip
         table.add_column(column, justify="right")
@@ -104,6 +114,8 @@ def main() -> None:
     console.print(
         f"(4, 60), from Python: construction {construct:.0f} us, emptiness {decide:.0f} us, bounding box {box:.0f} us"
     )
+    ball, axes = measure_box_in_kernel(4, 60)
+    console.print(f"(4, 60), in the kernel: largest ball {ball:.0f} us, support along the axes {axes:.0f} us")
 
 
 if __name__ == "__main__":

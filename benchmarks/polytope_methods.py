@@ -1,0 +1,94 @@
+"""The choices inside the polytope engine: which method projects, and Clarkson's method against Qhull's dual hull.
+
+Run with ``python -m benchmarks.polytope_methods``.  Times are CPU milliseconds, the better of two runs, on random rows.
+Qhull's dual hull proposes the facets among rows; to stay exact, programs confirm that the others are redundant, and
+which of its own are facets.
+"""
+
+from collections.abc import Callable
+from time import process_time
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.lp_kernel import random_polytope
+from benchmarks.polytopes import sparse_polytope
+from polytopes import HPolytope, ProjectionLimitError, warm_up
+from polytopes.linear_program import prepare
+from polytopes.redundancy import irredundant
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+PROJECTIONS = (  # variables, kept, rows, nonzeros in a row
+    (8, 4, 50, 2), (8, 3, 40, 3), (5, 3, 40, 3), (5, 3, 40, 5), (6, 2, 40, 6), (6, 3, 60, 6), (6, 4, 40, 6),
+    (6, 4, 60, 6), (7, 3, 40, 7), (7, 4, 30, 7), (8, 4, 30, 8),
+)  # fmt: skip
+METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
+REDUNDANCIES = ((2, 500), (2, 5000), (3, 500), (3, 2000), (4, 200), (4, 500), (4, 800), (4, 2000), (5, 800))
+
+
+def milliseconds(task: Callable[[], object]) -> float:
+    """CPU time, the better of two runs."""
+    times = []
+    for _ in range(2):
+        start = process_time()
+        task()
+        times.append(process_time() - start)
+    return 1e3 * min(times)
+
+
+def projection(P: HPolytope, kept: int, method: str) -> str:
+    """Time of one method; nothing where it has too many rows or vertices."""
+    if method == "vertices" and P.dim > 6 and P.b.size > 40:
+        return "-"
+    rows = 3000 if method == "fourier-motzkin" else 20_000
+    try:
+        return f"{milliseconds(lambda: HPolytope(P.A, P.b).project(range(kept), method, rows)):.1f}"
+    except ProjectionLimitError:
+        return "-"
+
+
+def by_dual_hull(AT: Floats, b: Floats, inner: Floats) -> Indices:
+    """A minimal set of rows: vertices of the dual hull, confirmed by programs."""
+    from scipy.spatial import ConvexHull
+
+    proposed = np.sort(ConvexHull((AT / (b - inner @ AT)).T).vertices)
+    others = np.setdiff1d(np.arange(b.size), proposed)
+    program = prepare(AT[:, proposed].T, b[proposed], np.empty((0, len(AT))), np.empty(0))
+    needed = others[program.maximise(AT[:, others].T).values > b[others] + 1e-12 * np.abs(b).max()]
+    candidates = np.sort(np.append(proposed, needed))
+    return candidates[irredundant(np.ascontiguousarray(AT[:, candidates]), b[candidates], inner)]
+
+
+def redundancy(variables: int, rows: int, tangent: bool) -> tuple[float, float]:
+    """Clarkson's method and the dual hull on random rows, or on rows tangent to a ball."""
+    P = random_polytope(variables, rows, 0)
+    program = HPolytope(P.A, np.ones(rows)).program if tangent else P.program
+    task = program.AT, program.rhs, program.interior.point
+    assert np.array_equal(irredundant(*task), by_dual_hull(*task))
+    return milliseconds(lambda: irredundant(*task)), milliseconds(lambda: by_dual_hull(*task))
+
+
+def main() -> None:
+    """Measure and print."""
+    warm_up()
+    console = Console(width=120)
+    methods = Table("projection", *METHODS, title="Projection, CPU milliseconds")
+    for variables, kept, rows, nonzeros in PROJECTIONS:
+        P = sparse_polytope(variables, rows, nonzeros)
+        name = f"R^{variables} -> R^{kept}, {rows} rows, {nonzeros} nonzeros"
+        methods.add_row(name, *(projection(P, kept, method) for method in METHODS))
+    console.print(methods)
+    dual = Table("variables, rows", "Clarkson", "dual hull", "tangent: Clarkson", "tangent: dual hull",
+                 title="Redundancy, CPU milliseconds")  # fmt: skip
+    for variables, rows in REDUNDANCIES:
+        times = [*redundancy(variables, rows, False)]
+        times += redundancy(variables, rows, True) if rows <= 2000 else []
+        dual.add_row(f"{variables}, {rows}", *(f"{time:.2f}" for time in times))
+    console.print(dual)
+
+
+if __name__ == "__main__":
+    main()
