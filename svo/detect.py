@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.alarms import Alarm, write_alarms
-from svo.isolation.architectures import ArchitectureI
+from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
 from svo.plant import Plant
@@ -82,7 +82,7 @@ class Detection:
         return tuple(name for name, alive in zip(self.record.names, self.record.alive[sample], strict=True) if alive)
 
 
-def verdicts(bank: ArchitectureI, log: Log, scheduler: Scheduler | None = None) -> Iterator[Verdict]:
+def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterator[Verdict]:
     """The bank's verdict at each sample of a log.
 
     Without a ``scheduler`` the schedule is the log's own. Sets and boxes of a verdict's steps must be read before

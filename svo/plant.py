@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.isolation.architectures import ArchitectureI
+from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 
@@ -90,7 +90,7 @@ class Plant(Protocol):
         """One run with its true states; ``fault`` may be "none". The log carries the schedule of `scheduler`."""
         ...
 
-    def bank(self, noise: str) -> ArchitectureI:
+    def bank(self, noise: str) -> Bank:
         """A fresh isolation bank; its fault observers are named as in `faults`."""
         ...
 

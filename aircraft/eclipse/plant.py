@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
 from svo.faults import SensorFault
-from svo.isolation.architectures import ArchitectureI
+from svo.isolation.architectures import ArchitectureI, ArchitectureII
+from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
@@ -82,10 +83,14 @@ class Eclipse:
     scenarios : Scenarios
     horizon : int
         Steps in the observers' windows.
+    architecture : {"I", "II"}
+        Of the bank. Under Architecture II the fault observers start, at the detection, from the set of all
+        states of a flight between 25 and 55 m/s.
     """
 
     scenarios: Scenarios = field(default_factory=Scenarios)
     horizon: int = 10
+    architecture: Literal["I", "II"] = "I"
     name: str = "eclipse"
     title: str = "Eclipse UAV, longitudinal axis: alpha sensor, elevator and M_u faults"
     Ts: float = TS
@@ -98,6 +103,10 @@ class Eclipse:
         "Rosa and Silvestre, Control Engineering Practice 21 (2013), section 6: "
         "means of 10 runs [s], 5 to 200 ms per observer and sample"
     )
+
+    def __post_init__(self) -> None:
+        if self.architecture not in ("I", "II"):
+            raise ValueError(f"architecture is {self.architecture!r}; expected 'I' or 'II'")
 
     def duration(self, fault: str, profile: str) -> float:
         """Length of a run [s]; ``fault`` may be "none"."""
@@ -136,11 +145,14 @@ class Eclipse:
             stated[name] = StatedFault(description, model)
         return stated
 
-    def bank(self, noise: str) -> ArchitectureI:
+    def bank(self, noise: str) -> Bank:
         """A fresh isolation bank of window observers with box templates."""
         initial = HPolytope.box(INITIAL_LOWER, INITIAL_UPPER)
         observers = {name: WindowObserver(m, initial, horizon=self.horizon) for name, m in self.models(noise).items()}
-        return ArchitectureI(nominal=observers.pop("nominal"), faults=observers)
+        nominal = observers.pop("nominal")
+        if self.architecture == "II":
+            return ArchitectureII(nominal, observers, global_=initial)
+        return ArchitectureI(nominal, observers)
 
     def scheduler(self) -> AirspeedFilter:
         """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""

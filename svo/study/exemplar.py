@@ -139,12 +139,12 @@ def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
         if fallen and sets:
             snapshots.append(Snapshot(k - 1, f"{', '.join(fallen)} falsified next", sets))
         living = verdict.alive
-        steps = {name: verdict.steps[name] for name in living}
+        steps = {name: verdict.steps[name] for name in living if name in verdict.steps}  # class II waits
         shown = log.time[k] >= plant.fault_time - plant.Ts and len(living) > 1  # what a snapshot may keep
         sets = {name: planar_outline(step) if shown else step.set for name, step in steps.items()}
-        for name in living:
+        alive[k] = [name in living for name in names]
+        for name, step in steps.items():
             i = names.index(name)
-            alive[k, i] = True
-            lower[k, i], upper[k, i] = verdict.steps[name].box
+            lower[k, i], upper[k, i] = step.box
     snapshots.append(Snapshot(len(log) - 1, "end of the run", sets))
     return Exemplar(job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots))

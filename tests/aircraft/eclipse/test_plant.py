@@ -77,7 +77,18 @@ def test_quiet_step_is_detected_and_isolated_as_the_paper_says(fault):
     assert record.died_at[fault] is None
 
 
+def test_under_architecture_two_a_fault_is_detected_at_the_same_sample_and_isolated():
+    log = PLANT.simulate("elevator", "step", "quiet", 11)
+    one, two = (Eclipse(architecture=number).bank("quiet").run(log) for number in ("I", "II"))
+    assert two.detected_at == one.detected_at
+    assert (two.fault, two.died_at["elevator"]) == ("elevator", None)
+    assert two.isolated_at >= one.isolated_at
+    assert np.isnan(two.seconds[: two.detected_at, 1:]).all()
+
+
 def test_unknown_noise_and_reference_are_refused():
+    with pytest.raises(ValueError, match="architecture is 'III'"):
+        Eclipse(architecture="III")
     with pytest.raises(ValueError, match="loud"):
         PLANT.models("loud")
     with pytest.raises(ValueError, match="relative"):
