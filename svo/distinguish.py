@@ -246,17 +246,25 @@ class _Answer:
 
     @cached_property
     def separation(self) -> float:
-        return max(0.0, self.program.weak_dual_bound(self.cost, self.solution.multipliers))
+        # The widening has no upper bound, so its reduced cost must not fall below zero by rounding.
+        return max(0.0, self.program.weak_dual_bound(self.cost, (1.0 - 1e-7) * self.solution.multipliers))
 
     @property
     def separated(self) -> bool:
         return self.separation > LEAST_SEPARATION
 
     @property
+    def has_common_output(self) -> bool:
+        """Whether the point found is one, as far as the solver's tolerance can tell."""
+        return self.solution.value <= 2 * LEAST_SEPARATION
+
+    @property
     def exact(self) -> bool:
-        return self.plant.exact and self.observer.exact
+        return self.plant.exact and self.observer.exact and (self.separated or self.has_common_output)
 
     def witness(self) -> Witness | None:
+        if not self.has_common_output:
+            return None
         point, sides = self.solution.point, (self.plant, self.observer)
         outputs = [_noise_free(side, point) for side in sides]
         noise = [np.array([s.noise for s in side.samples]) for side in sides]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from typer.testing import CliRunner
@@ -134,6 +134,7 @@ def test_a_model_never_differs_from_itself_nor_from_one_that_contains_it(seed: i
 
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6))
+@example(seed=32074)  # the bound by weak duality was lost to rounding
 def test_more_noise_never_makes_it_sooner(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model = random_plant(rng, largest=2)
