@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.model import UncertainModel
-from svo.observers.vertex_images import reach_of
+from svo.observers.vertex_images import outer_support, reach_of
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def output_rows(
 
 def _chords(s: Array, joint: HPolytope, bounds: tuple[float, float]) -> tuple[Array, Array]:
     """Affine functions (coefficients, constant) above and below Delta s, for s = (f, s0) over the set."""
-    right, left = np.array([1.0, -1.0]) * joint.support(np.vstack([s[:-1], -s[:-1]])) + s[-1]
+    right, left = np.array([1.0, -1.0]) * outer_support(joint, np.vstack([s[:-1], -s[:-1]])) + s[-1]
     lines = []
     for choose in (max, min):
         ends = [choose(delta * end for delta in bounds) for end in (left, right)]

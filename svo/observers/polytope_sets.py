@@ -9,12 +9,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes import HPolytope
+from polytopes import HPolytope, UndecidedError
 from svo.model import UncertainModel
 from svo.observers.output_rows import output_rows
 from svo.observers.polytope_step import AnyCertificate, PolytopeCertificate, PublishedCertificate, intersection
 from svo.observers.step import VerdictName
-from svo.observers.vertex_images import hull_normals, hull_of_images, image, limited, template, widened_rows
+from svo.observers.vertex_images import hull_normals, hull_of_images, image, limited, reach_of, template, widened_rows
 
 Array = NDArray[np.float64]
 Maps = Sequence[tuple[Array, Array]]
@@ -173,5 +173,16 @@ def _cut(
         if certificate.verify():
             return Outcome("falsified", certificate, known, ())
     if answer.status == "nonempty":
-        return Outcome("consistent", None, limited(cut, max_facets), memory)
+        return Outcome("consistent", None, _resolved(cut, known, max_facets), memory)
     return Outcome("undecided", None, limited(known, max_facets), memory)
+
+
+def _resolved(cut: HPolytope, known: HPolytope, max_facets: int | None) -> HPolytope:
+    """The cut set; under a budget the set before the cut, where the cut is too thin for float programs to bound."""
+    kept = limited(cut, max_facets)
+    if max_facets is not None:
+        try:
+            reach_of(kept)
+        except UndecidedError:
+            return limited(known, max_facets)
+    return kept

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from polytopes import Certificate, HPolytope
 from svo.observers.step import VerdictName
+from svo.observers.vertex_images import outer_support
 
 Array = NDArray[np.float64]
 
@@ -92,8 +93,9 @@ class PolytopeStep:
         """Bounds (lower, upper), each (n,), of the state at this sample; NaN once the model is falsified."""
         if self.verdict == "falsified":
             return np.full(self.n, np.nan), np.full(self.n, np.nan)
-        lower, upper = self.joint.bounding_box()
-        return lower[: self.n], upper[: self.n]
+        axes = np.eye(self.n, self.joint.dim)
+        ends = outer_support(self.joint, np.vstack([axes, -axes]))
+        return -ends[self.n :], ends[: self.n]
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,12 @@ def test_truth_stays_inside_exact_sets(seed: int) -> None:
         check_containment(PolytopeObserver(model, initial, max_facets=None), log, y)
 
 
+def test_truth_stays_inside_a_set_thinner_than_floats_resolve() -> None:
+    """An exact sensor and a contraction: nearly parallel rows, over which float optima were wrong by 6e-4."""
+    _, model, initial, log, y = random_run(132, 12)
+    check_containment(PolytopeObserver(model, initial, max_facets=40), log, y)
+
+
 @pytest.mark.slow
 def test_truth_stays_inside_three_hundred_random_plants() -> None:
     for seed in range(300):
