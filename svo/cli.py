@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from svo.cli_output import describe, print_checks, print_detection, print_isolability, print_json, print_study
 
+if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
-    from svo.detect import Detection
-    from svo.isolability import Isolability
     from svo.log import Log
     from svo.plant import Plant
-    from svo.study.summary import ConditionSummary
 
 app = typer.Typer(
     help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
@@ -51,7 +47,7 @@ def plants(as_json: AsJson = False) -> None:
 
         every = [load_plant(name) for name in registered_plants()]
         if as_json:
-            _print_json([_describe(plant) for plant in every])
+            print_json([describe(plant) for plant in every])
             return
         for plant in every:
             typer.echo(f"{plant.name}: {plant.title}")
@@ -115,9 +111,9 @@ def study(
         if as_json:
             from svo.study.summary import to_json
 
-            _print_json({"configuration": configuration.to_dict(), "summary": to_json(summaries)})
+            print_json({"configuration": configuration.to_dict(), "summary": to_json(summaries)})
         else:
-            _print_study(the_plant, summaries)
+            print_study(the_plant, summaries)
             typer.echo(f"Report: {out / 'report.html'}")
 
 
@@ -197,9 +193,9 @@ def detect(
         if out is not None:
             write_detection(out, found)
         if as_json:
-            _print_json(found.to_dict())
+            print_json(found.to_dict())
             return
-        _print_detection(found)
+        print_detection(found)
         if out is not None:
             typer.echo(f"Alarms with certificates: {out / 'alarms.jsonl'}")
 
@@ -229,14 +225,14 @@ def verify(
     with _one_line_errors():
         checks = _checks(alarms, log, full)
         if as_json:
-            _print_json(
+            print_json(
                 [
                     {"line": c.line, "observer": c.observer, "sample": c.sample, "ok": c.ok, "reason": c.reason}
                     for c in checks
                 ]
             )
         else:
-            _print_checks(alarms, checks)
+            print_checks(alarms, checks)
     if not all(check.ok for check in checks):
         raise typer.Exit(1)
 
@@ -273,9 +269,9 @@ def distinguish(
         with progress("Pairs") as update:
             answer = isolability(the_plant, noise, horizon, seed, progress=update)
         if as_json:
-            _print_json(answer.to_dict())
+            print_json(answer.to_dict())
         else:
-            _print_isolability(answer)
+            print_isolability(answer)
 
 
 @app.command()
@@ -307,7 +303,7 @@ def calibrate(
         _announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
         found = calibrate_log(the_plant, samples, noise)
         if as_json:
-            _print_json(found.to_dict())
+            print_json(found.to_dict())
         else:
             typer.echo(found.to_text())
 
@@ -373,98 +369,5 @@ def _noise(plant: Plant, noise: str | None) -> str:
     return plant.noise_sets[0] if noise is None else noise
 
 
-def _describe(plant: Plant) -> dict[str, Any]:
-    columns = plant.columns
-    return {
-        "name": plant.name,
-        "title": plant.title,
-        "Ts": plant.Ts,
-        "fault_time": plant.fault_time,
-        "faults": {fault: list(profiles) for fault, profiles in plant.faults.items()},
-        "noise_sets": list(plant.noise_sets),
-        "columns": {
-            "time": columns.time,
-            **{
-                group: [{"name": c.name, "unit": c.unit} for c in getattr(columns, group)]
-                for group in ("inputs", "outputs", "states")
-            },
-        },
-    }
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    console = Console(highlight=False)
-    # A file has no width: a table in it need not be cut off.
-    return console if console.is_terminal else Console(highlight=False, width=130)
-
-
 def _announce(what: str) -> None:
     typer.echo(f"{what} ...", err=True)
-
-
-def _print_json(value: Any) -> None:
-    typer.echo(json.dumps(value, indent=2))
-
-
-def _print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
-    from svo.study import tables
-
-    console = _console()
-    for noise in dict.fromkeys(s.noise for s in summaries):
-        chosen = [s for s in summaries if s.noise == noise]
-        console.print(tables.to_rich(tables.delay_table(plant, chosen)))
-        for line in [*tables.counts(chosen), *tables.not_isolated(chosen), tables.cost(chosen)]:
-            typer.echo(f"{line[0].upper()}{line[1:]}.")
-        typer.echo("")
-    if plant.reference:
-        typer.echo(f"Paper: {plant.reference_title}; a dash where it says nothing.")
-
-
-def _print_detection(found: Detection) -> None:
-    if found.detected_s is None:
-        typer.echo(f"No fault: the nominal model explains all {len(found.time)} samples ({found.noise} noise).")
-    else:
-        typer.echo(f"Fault detected at {found.detected_s:g} s: the nominal model is falsified ({found.noise} noise).")
-        if found.isolated_s is not None:
-            typer.echo(f"Fault isolated at {found.isolated_s:g} s: {found.record.fault}.")
-        elif found.alive:
-            typer.echo("Not isolated: more than one model explains the data.")
-    for alarm in found.alarms:
-        typer.echo(f"    {alarm.observer}: falsified at {alarm.time:g} s")
-    for name in found.alive:
-        typer.echo(f"    {name}: explains the data to the end")
-    if not found.alive:
-        typer.echo(f"No model explains the data from {max(alarm.time for alarm in found.alarms):g} s on.")
-    undecided = int(found.record.undecided.sum())
-    if undecided:
-        typer.echo(f"    undecided answers: {undecided}")
-
-
-def _print_isolability(answer: Isolability) -> None:
-    from rich.table import Table
-
-    table = Table(title=f"Samples until an observer is surely falsified ({answer.noise} noise)")
-    table.add_column("plant with fault")
-    observers = list(next(iter(answer.answers.values())))
-    for name in observers:
-        table.add_column(f"observer {name}")
-    for fault, description in answer.faults.items():
-        table.add_row(f"{fault}: {description}", *(answer.cell(fault, name) for name in observers))
-    _console().print(table)
-    typer.echo(
-        f"Inputs and schedule: the fault-free flight of seed {answer.seed}, from {answer.fault_time:g} s on. "
-        "The first faulty sample counts as 1; an observer with a short window may need more."
-    )
-
-
-def _print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:
-    failed = [check for check in checks if not check.ok]
-    for check in failed:
-        whose = f" ({check.observer}, sample {check.sample})" if check.sample >= 0 else ""
-        typer.echo(f"{path}, line {check.line}{whose}: {check.reason}", err=True)
-    seconds = sum(check.seconds for check in checks)
-    typer.echo(
-        f"{path}: {len(checks) - len(failed)} of {len(checks)} alarms proven in exact arithmetic, in {seconds:.2f} s"
-    )

@@ -1,0 +1,119 @@
+"""What the command line prints. Whatever is slow to import is imported where it is needed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from svo.alarms import AlarmCheck
+    from svo.detect import Detection
+    from svo.isolability import Isolability
+    from svo.plant import Plant
+    from svo.study.summary import ConditionSummary
+
+
+def describe(plant: Plant) -> dict[str, Any]:
+    """A plant as plain data, for JSON."""
+    columns = plant.columns
+    return {
+        "name": plant.name,
+        "title": plant.title,
+        "Ts": plant.Ts,
+        "fault_time": plant.fault_time,
+        "faults": {fault: list(profiles) for fault, profiles in plant.faults.items()},
+        "noise_sets": list(plant.noise_sets),
+        "columns": {
+            "time": columns.time,
+            **{
+                group: [{"name": c.name, "unit": c.unit} for c in getattr(columns, group)]
+                for group in ("inputs", "outputs", "states")
+            },
+        },
+    }
+
+
+def console() -> Console:
+    """Where tables go."""
+    from rich.console import Console
+
+    terminal = Console(highlight=False)
+    # A file has no width: a table in it need not be cut off.
+    return terminal if terminal.is_terminal else Console(highlight=False, width=130)
+
+
+def print_json(value: Any) -> None:
+    """Figures as JSON on standard output."""
+    typer.echo(json.dumps(value, indent=2))
+
+
+def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
+    """Tables of a study, one a noise set, and what they count."""
+    from svo.study import tables
+
+    screen = console()
+    for noise in dict.fromkeys(s.noise for s in summaries):
+        chosen = [s for s in summaries if s.noise == noise]
+        screen.print(tables.to_rich(tables.delay_table(plant, chosen)))
+        for line in [*tables.counts(chosen), *tables.not_isolated(chosen), tables.cost(chosen)]:
+            typer.echo(f"{line[0].upper()}{line[1:]}.")
+        typer.echo("")
+    if plant.reference:
+        typer.echo(f"Paper: {plant.reference_title}; a dash where it says nothing.")
+
+
+def print_detection(found: Detection) -> None:
+    """What a bank found in a log."""
+    if found.detected_s is None:
+        typer.echo(f"No fault: the nominal model explains all {len(found.time)} samples ({found.noise} noise).")
+    else:
+        typer.echo(f"Fault detected at {found.detected_s:g} s: the nominal model is falsified ({found.noise} noise).")
+        if found.isolated_s is not None:
+            typer.echo(f"Fault isolated at {found.isolated_s:g} s: {found.record.fault}.")
+        elif found.alive:
+            typer.echo("Not isolated: more than one model explains the data.")
+    for alarm in found.alarms:
+        typer.echo(f"    {alarm.observer}: falsified at {alarm.time:g} s")
+    for name in found.alive:
+        typer.echo(f"    {name}: explains the data to the end")
+    if not found.alive:
+        typer.echo(f"No model explains the data from {max(alarm.time for alarm in found.alarms):g} s on.")
+    undecided = int(found.record.undecided.sum())
+    if undecided:
+        typer.echo(f"    undecided answers: {undecided}")
+
+
+def print_isolability(answer: Isolability) -> None:
+    """Samples until each observer is surely falsified, fault by fault."""
+    from rich.table import Table
+
+    table = Table(title=f"Samples until an observer is surely falsified ({answer.noise} noise)")
+    table.add_column("plant with fault")
+    observers = list(next(iter(answer.answers.values())))
+    for name in observers:
+        table.add_column(f"observer {name}")
+    for fault, description in answer.faults.items():
+        table.add_row(f"{fault}: {description}", *(answer.cell(fault, name) for name in observers))
+    console().print(table)
+    typer.echo(
+        f"Inputs and schedule: the fault-free flight of seed {answer.seed}, from {answer.fault_time:g} s on. "
+        "The first faulty sample counts as 1; an observer with a short window may need more."
+    )
+
+
+def print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:
+    """Alarms that failed, one a line on standard error, and how many were proven."""
+    failed = [check for check in checks if not check.ok]
+    for check in failed:
+        whose = f" ({check.observer}, sample {check.sample})" if check.sample >= 0 else ""
+        typer.echo(f"{path}, line {check.line}{whose}: {check.reason}", err=True)
+    seconds = sum(check.seconds for check in checks)
+    typer.echo(
+        f"{path}: {len(checks) - len(failed)} of {len(checks)} alarms proven in exact arithmetic, in {seconds:.2f} s"
+    )
