@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from svo.isolation.architectures import ArchitectureI, ArchitectureII
     from svo.isolation.record import BankRecord, Verdict
     from svo.log import Log
-    from svo.model import UncertainModel, Uncertainty
+    from svo.model import UncertainModel
     from svo.observers.polytope import PolytopeObserver
     from svo.observers.window import WindowObserver
+    from svo.uncertainty import Uncertainty
 
 __all__ = [
     "ArchitectureI",
@@ -42,7 +43,7 @@ _HOMES = {
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",
     "UncertainModel": "svo.model",
-    "Uncertainty": "svo.model",
+    "Uncertainty": "svo.uncertainty",
     "Verdict": "svo.isolation.record",
     "WindowObserver": "svo.observers.window",
     "calibrate": "svo.calibration",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +12,7 @@ from scipy.linalg import expm
 
 from polytopes import HPolytope
 from svo.checks import finite_array
-
-if TYPE_CHECKING:
-    from svo.model import Uncertainty
+from svo.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 

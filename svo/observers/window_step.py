@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,20 @@ from polytopes import HPolytope
 from svo.observers.proof import WindowCertificate
 from svo.observers.step import VerdictName
 
-if TYPE_CHECKING:
-    from svo.observers.window import WindowObserver
-
 Array = NDArray[np.float64]
+
+
+class _Window(Protocol):
+    """What an answer asks of the observer that gave it."""
+
+    model: Any
+
+    @property
+    def directions(self) -> Array: ...
+
+    def _bounds_at(self, sample: int) -> tuple[Array, Array]: ...
+
+    def _support_at(self, sample: int, directions: Array) -> Array: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +35,7 @@ class WindowStep:
     `box` and `set` are computed when they are read, which must be before the observer's next sample.
     """
 
-    observer: WindowObserver
+    observer: _Window
     sample: int
     verdict: VerdictName
     certificate: WindowCertificate | None
