@@ -16,14 +16,14 @@ from rich.table import Table
 
 from aircraft.eclipse.plant import Eclipse
 from benchmarks._window_runs import HORIZON, NOISE, SCHEDULES, SEED, SETTLE, TURN, Sample, Times, drive, observer_of
-from svo.isolation.architectures import ArchitectureI
+from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.observers.window import WindowObserver
 
 HORIZONS = (1, 5, 10, 20, 50)
 
 
-def alone(start: Callable[[], WindowObserver | ArchitectureI], logs: list[Log], between: Callable[[], object]) -> Times:
+def alone(start: Callable[[], WindowObserver | Bank], logs: list[Log], between: Callable[[], object]) -> Times:
     """An observer or a bank by itself over several logs, with something done between its samples."""
     times = Times()
     for i, log in enumerate(logs):
@@ -50,7 +50,7 @@ def tabulate_alone(plant: Eclipse, logs: list[Log]) -> Table:
         "nothing": lambda: None,
         "8 MB of memory written": lambda: np.add(memory, 1.0, out=memory),
     }
-    starts: dict[tuple[str, str], Callable[[], WindowObserver | ArchitectureI]] = {
+    starts: dict[tuple[str, str], Callable[[], WindowObserver | Bank]] = {
         (name, SCHEDULES[0]): partial(observer_of, model) for name, model in models.items()
     }
     starts["bank of four", SCHEDULES[0]] = partial(plant.bank, NOISE)

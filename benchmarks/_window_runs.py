@@ -11,7 +11,7 @@ import numpy as np
 from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER
 from benchmarks._window_references import Floats
 from polytopes import HPolytope
-from svo.isolation.architectures import ArchitectureI
+from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
@@ -55,7 +55,7 @@ def observer_of(model: UncertainModel, horizon: int = HORIZON, schedule: str = "
     return observer
 
 
-def drive(observer: WindowObserver | ArchitectureI, log: Log) -> Sample:
+def drive(observer: WindowObserver | Bank, log: Log) -> Sample:
     """A function that gives an observer or a bank sample k of a log."""
     u, y, schedule = list(log.u), list(log.y), [log.schedule_at(k) for k in range(len(log))]
 
