@@ -14,8 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import linprog
 
-from polytopes import HPolytope, warm_up
-from polytopes import simplex_kernel as kernel
+from polytopes import HPolytope, kernel, warm_up
 from polytopes.highs import HighsProgram
 
 Floats = NDArray[np.float64]

@@ -15,6 +15,7 @@ Multipliers = dict[int, fmpq]  # row index -> multiplier; rows that are absent h
 
 ZERO = fmpq(0)
 _INTEGERS = 2**53  # integers up to here are floats
+_CANCELLING = 1e-3  # of the terms of a sum: below, its rounding errors would count
 
 
 def rational(value: float) -> fmpq:
@@ -134,3 +135,31 @@ def refutes(
 
 def _indices_fit(multipliers: Multipliers, rows: NDArray[np.float64]) -> bool:
     return all(0 <= i < rows.shape[0] for i in multipliers)
+
+
+def substituted(
+    A: NDArray[np.float64], b: NDArray[np.float64], point: NDArray[np.float64], basis: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rows ``A x <= b`` in z with ``x = point + basis z``, each entry rounded once: those that cancel are formed exactly.
+
+    Rows come scaled by powers of two, to about unit norm.
+
+    Parameters
+    ----------
+    A, b : arrays (m, n) and (m,)
+    point, basis : arrays (n,) and (n, k)
+    """
+    both = np.hstack([basis, point[:, None]])
+    table, magnitude = A @ both, np.abs(A) @ np.abs(both)
+    table[:, -1] = b - table[:, -1]
+    magnitude[:, -1] += np.abs(b)
+    for i, j in np.argwhere(np.abs(table) < _CANCELLING * magnitude).tolist():
+        value = rational(b[i]) if j == basis.shape[1] else ZERO
+        sign = -1 if j == basis.shape[1] else 1
+        for u, v in zip(A[i].tolist(), both[:, j].tolist(), strict=True):
+            if u and v:
+                value += sign * rational(u) * rational(v)
+        table[i, j] = int(value.p) / int(value.q)
+    norms = np.linalg.norm(table[:, :-1], axis=1)
+    table = np.ldexp(table, -np.frexp(np.where(norms > 0.0, norms, 1.0))[1][:, None])
+    return table[:, :-1], table[:, -1]

@@ -13,12 +13,12 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes import kernel
 from polytopes.errors import ProjectionLimitError
-from polytopes.redundancy import irredundant
+from polytopes.linear_program import warm_up
+from polytopes.redundancy import settle
 
 Floats = NDArray[np.float64]
-# A sum this small beside its two terms is zero: rounding errors of earlier steps would make it a row of noise.
-_CANCELLED = 64.0 * float(np.finfo(np.float64).eps)
 _LOG = logging.getLogger("polytopes")
 
 
@@ -45,47 +45,28 @@ def eliminate(A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows:
     ProjectionLimitError
         If one step would form more than `max_rows` rows.
     """
+    warm_up()
     left = list(range(A.shape[1]))
-    table = _pruned(np.hstack([A, b[:, None]]), inner)
+    table = np.hstack([A, b[:, None]])[A.any(axis=1)]
+    table = _settled(kernel.pruned(table, inner), inner)
     for done in range(len(columns)):
-        growths = _growths(table)
-        j = min((left.index(c) for c in columns if c in left), key=growths.__getitem__)
-        formed = len(table) + int(growths[j])
+        candidates = np.array([k for k, j in enumerate(left) if j in columns])
+        j, formed = kernel.cheapest(table, candidates)
         if formed > max_rows:
             raise ProjectionLimitError(
                 f"eliminating variable {done + 1} of {len(columns)} would form {formed} rows from {len(table)}, more "
                 f"than max_rows={max_rows}; raise the limit, use outer=True for a superset, or another method."
             )
         del left[j]
-        table = _pruned(_combined(table, j), inner[left])
+        inner = np.delete(inner, j)
+        table = _settled(kernel.step(table, j, formed, inner), inner)
         _LOG.info("eliminated variable %d of %d: %d rows formed, %d kept", done + 1, len(columns), formed, len(table))
     return table[:, :-1], table[:, -1]
 
 
-def _growths(table: Floats) -> NDArray[np.int64]:
-    """Change of the number of rows when a coordinate is eliminated, for each."""
-    positive, negative = (table > 0).sum(axis=0), (table < 0).sum(axis=0)
-    growths: NDArray[np.int64] = positive * negative - positive - negative
-    return growths
-
-
-def _combined(table: Floats, j: int) -> Floats:
-    """All rows ``[A, b]`` without x_j, and all pairs in which it cancels."""
-    column, rows = table[:, j], np.delete(table, j, axis=1)
-    up, down = column > 0, column < 0
-    # Products, not quotients: rows of small integers stay exact.
-    above = rows[up][:, None, :] * -column[down][None, :, None]
-    below = rows[down][None, :, :] * column[up][:, None, None]
-    pairs, magnitude = above + below, np.abs(above) + np.abs(below)
-    pairs[np.abs(pairs) <= _CANCELLED * magnitude] = 0.0
-    return np.vstack([rows[~(up | down)], pairs.reshape(-1, rows.shape[1])])
-
-
-def _pruned(table: Floats, inner: Floats) -> Floats:
-    """The facets among rows ``[A, b]``, scaled by powers of two."""
-    largest = np.abs(table[:, :-1]).max(axis=1)
-    table, largest = table[largest > 0.0], largest[largest > 0.0]
-    if not len(table):
-        return table
-    table = np.ldexp(table, -np.frexp(largest)[1][:, None])
-    return table[irredundant(np.ascontiguousarray(table[:, :-1].T), table[:, -1], inner)]
+def _settled(answer: tuple[Floats, NDArray[np.int64]], inner: Floats) -> Floats:
+    """The facets among rows ``[A, b]``, some of which the kernel may have left open."""
+    table, doubtful = answer
+    if doubtful.any():
+        table = table[settle(table[:, :-1], table[:, -1], inner, doubtful)]
+    return table

@@ -1,13 +1,19 @@
 """Coordinates in which a set is about as wide in every direction, found by asking for support points."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.exact import substituted
+from polytopes.linear_program import OPTIMAL, prepare
+
 Floats = NDArray[np.float64]
 Oracle = Callable[[Floats], Floats]  # directions (k, n) -> a maximiser for each, (k, n)
 _EVEN = 0.05  # smallest spread of the support points at which the axes are good enough
+_NOISE = 1e-15  # width, relative to the coordinates of the points, below which it is rounding
+_ROUND = 0.02  # radius of a largest ball in coordinates that are good enough
 
 
 def unit_frame(oracle: Oracle, centre: Floats) -> Floats:
@@ -39,7 +45,64 @@ def principal_axes(points: Floats) -> tuple[Floats, Floats]:
 def _scaled(oracle: Oracle, frame: Floats) -> Floats:
     """The axes multiplied by the widths of the set along them."""
     axes = np.asarray(np.linalg.inv(frame), dtype=np.float64)
-    upper = (oracle(axes) * axes).sum(axis=1)
-    lower = (oracle(-axes) * axes).sum(axis=1)
-    scaled: Floats = frame * (upper - lower)
+    above, below = oracle(axes), oracle(-axes)
+    noise = _NOISE * (np.abs(np.vstack([above, below])).max(axis=0) * np.abs(axes)).sum(axis=1)
+    scaled: Floats = frame * np.maximum(((above - below) * axes).sum(axis=1), np.maximum(noise, 1e-300))
     return scaled
+
+
+@dataclass(frozen=True, eq=False)
+class UnitBody:
+    """A set in coordinates z, ``x = centre + axes z``, in which it is about a unit ball.
+
+    Rows (m, n) and rhs (m,) are rounded once, whatever cancels on the way; `inner` (n,) is a point z strictly inside.
+    """
+
+    centre: Floats
+    axes: Floats
+    rows: Floats
+    rhs: Floats
+    inner: Floats
+
+    def lift(self, z: Floats) -> Floats:
+        """Points z (..., n) in the coordinates x."""
+        x: Floats = self.centre + z @ self.axes.T
+        return x
+
+
+def unit_body(A: Floats, b: Floats, inner: Floats) -> UnitBody | None:
+    """Coordinates for a full-dimensional set ``A x <= b``; None if it is unbounded, or rounding hides its shape.
+
+    Each round measures the set in the coordinates of the round before, so that a width of 1e-12 of the others, of
+    which floats see a few digits at first, comes out right in the end.
+    """
+    n = inner.size
+    centre, axes = inner, np.eye(n)
+    rows, rhs = substituted(A, b, centre, axes)
+    for _ in range(6):
+        body = _measured(rows, rhs)
+        if body is None:
+            return None
+        point, turn, radius = body
+        if radius > _ROUND:
+            return UnitBody(centre, axes, rows, rhs, point)
+        centre, axes = centre + axes @ point, axes @ turn
+        rows, rhs = substituted(A, b, centre, axes)
+    return None
+
+
+def _measured(rows: Floats, rhs: Floats) -> tuple[Floats, Floats, float] | None:
+    """A centre of the set, axes of unit width and the radius of a largest ball over the distance of the far points."""
+    n = rows.shape[1]
+    program = prepare(rows, rhs, np.empty((0, n)), np.empty(0))
+    axes = np.eye(n)
+    extremes = program.maximise(np.vstack([axes, -axes]))
+    if any(name != OPTIMAL for name in extremes.status):
+        return None
+    point = program.balanced.interior.point
+    reach = float(np.abs(extremes.points - point).max())
+    radius = program.balanced.interior.radius / reach if program.balanced is program and reach > 0.0 else 0.0
+    if radius > _ROUND and 0.1 < reach < 10.0:
+        return point, axes, radius
+    turn = unit_frame(lambda directions: program.maximise(directions).points, point)
+    return (point, turn, 0.0) if np.isfinite(turn).all() else None

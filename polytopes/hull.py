@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.frame import Oracle, principal_axes, unit_frame
-from polytopes.redundancy import facets
-from polytopes.rows import Rows
+from polytopes.qhull import point_hull
+from polytopes.redundancy import irredundant
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _FLAT = 1e-12  # relative width below which points are taken to lie in a subspace
+_NOISE = 1e-15  # width of a coordinate, relative to the largest one, that may be rounding
 _SLIVER = 1e-5  # relative volume and least edge of a simplex that fixes its hyperplane
 _TOUCHING = 1e-13  # distance from a hyperplane at which a point lies on it (widths are about one)
 _ALIKE = 1e-6  # distance between two rows below which they may be one facet
@@ -26,26 +27,30 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """
     n = V.shape[1]
     centre = V.mean(axis=0)
-    offsets = V - centre
-    sizes, axes = principal_axes(V)
+    scale = _axis_scales(V)
+    offsets = (V - centre) / scale
+    sizes, axes = principal_axes(offsets)
     rank = int(np.count_nonzero(sizes > _FLAT * sizes[0]))
-    C = axes[rank:]
+    C = axes[rank:] / scale
+    C /= np.linalg.norm(C, axis=1)[:, None]
     d = C @ centre
     if rank == 0:
         return np.empty((0, n)), np.empty(0), np.eye(n), V[0].copy()
     found = _facets(offsets @ axes[:rank].T / sizes[:rank])
-    normals = found.rows[:, :-1] / sizes[:rank] @ axes[:rank]
+    rows = found.rows[:, :-1]
+    if not found.certain():
+        rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(rank))]
+    normals = rows / sizes[:rank] @ axes[:rank] / scale
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    A, b = _without_doubt(normals, (V @ normals.T).max(axis=0), found.certain(), centre, axes[:rank])
-    return A, b, C, d
+    return normals, (V @ normals.T).max(axis=0), C, d
 
 
-def _without_doubt(A: Floats, b: Floats, certain: bool, inner: Floats, axes: Floats) -> tuple[Floats, Floats]:
-    """The rows themselves if they are certainly facets, else those that linear programs confirm, within the axes."""
-    if certain:
-        return A, b
-    kept = facets(Rows(A @ axes.T, b - A @ inner).program, np.zeros(len(axes)))
-    return A[kept], b[kept]
+def _axis_scales(V: Floats) -> Floats:
+    """Powers of two near the widths of the points along the axes; where those are rounding, near the points' size."""
+    widths, sizes = np.ptp(V, axis=0), np.abs(V).max(axis=0)
+    real = (widths > _FLAT * sizes) & (widths > _NOISE * sizes.max())
+    widths = np.where(real, widths, np.maximum(sizes, widths.max()))
+    return np.ldexp(1.0, np.frexp(np.where(widths > 0.0, widths, 1.0))[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +90,13 @@ class _Facets:
 
 
 def _facets(points: Floats) -> _Facets:
-    from scipy.spatial import ConvexHull
-
     if points.shape[1] == 1:
         ends = np.array([[points.argmax()], [points.argmin()]])
         rows = np.array([[1.0, -points.max()], [-1.0, points.min()]])
         return _Facets(points, rows, ends, np.arange(2), ends[:, 0])
-    hull = ConvexHull(points)
-    rows, number = np.unique(hull.equations, axis=0, return_inverse=True)
-    return _Facets(points, rows, hull.simplices, number.ravel(), hull.vertices)
+    equations, simplices, corners = point_hull(points)
+    rows, number = np.unique(equations, axis=0, return_inverse=True)
+    return _Facets(points, rows, simplices, number.ravel(), corners)
 
 
 def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
@@ -126,10 +129,12 @@ def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
         return points
 
     found = _refined(scaled_oracle, n)
-    normals = found.rows[:, :-1] @ axes
+    rows = found.rows[:, :-1]
+    if not found.certain():
+        rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(n))]
+    normals = rows @ axes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    offsets = (normals * oracle(normals)).sum(axis=1)
-    return _without_doubt(normals, offsets, found.certain(), inner, np.eye(n))
+    return normals, (normals * oracle(normals)).sum(axis=1)
 
 
 def _refined(oracle: Oracle, n: int) -> _Facets:

@@ -9,13 +9,13 @@ undecided, never guessed.
 
 import logging
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes import simplex_kernel as kernel
+from polytopes import kernel
 from polytopes.affine import AffineSet, affine_set
 from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum, rounded
 from polytopes.highs import HighsProgram
@@ -27,6 +27,9 @@ _KERNEL_VARIABLES = 40
 _KERNEL_ENTRIES = 200_000
 _CLEAN = 1e-9  # relative violation of the optimality conditions that is still accepted from HiGHS
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
+_SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
+_NOISE = 1e-15  # width, relative to the coordinates, that may be rounding
+_UNEVEN = 256.0  # ratio of the widths along two axes from which the axes are scaled
 
 _ANNOUNCE_AFTER = 1.5  # seconds; loading the kernels from the cache takes less
 
@@ -49,8 +52,11 @@ def warm_up() -> None:
         AT, b, norms = np.array([[1.0, -1.0]]), np.ones(2), np.ones(2)
         kernel.interior(AT, b, norms, np.zeros(1), 1.0)
         kernel.supports(AT, b, np.zeros(1), np.ones((1, 1)))
-        kernel.irredundant_naive(AT, b, np.zeros(1), 0.0)
-        kernel.irredundant_clarkson(AT, b, np.zeros(1), 0.0)
+        kernel.irredundant(AT, b, np.zeros(1))
+        table = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]])
+        kernel.cheapest(table, np.zeros(1, np.int64))
+        kernel.pruned(table, np.zeros(2))
+        kernel.step(table, 0, 1, np.zeros(1))
     finally:
         announce.cancel()
 
@@ -91,6 +97,8 @@ class Program:
         Norms of the scaled rows in the metric of x, within the affine set.
     scale : array (kept,)
         The powers of two.
+    columns : array (free,)
+        Powers of two: the coordinates of AT are the free coordinates divided by them.
     kept : array of int
         The rows that are not constant on the affine set.
     violated : int or None
@@ -104,6 +112,7 @@ class Program:
     rhs: Floats
     norms: Floats
     scale: Floats
+    columns: Floats
     kept: Indices
     violated: int | None
 
@@ -139,7 +148,7 @@ class Program:
             if status == kernel.OPTIMAL:
                 weights = np.zeros(kept + 1)
                 weights[active[active >= 0]] = y[active >= 0]
-                return Interior(self.flat.lift(z), _uncapped(radius, cap), self._unscaled(weights[:kept]), True)
+                return Interior(self.flat.lift(z * self.columns), _uncapped(radius, cap), self._unscaled(weights[:kept]), True)
         return self._interior_by_highs(cap)
 
     def _interior_by_highs(self, cap: float) -> Interior:
@@ -149,13 +158,59 @@ class Program:
         point = answer.point if answer.point.size == free + 1 else np.zeros(free + 1)
         weights = answer.multipliers[:kept] if answer.multipliers.size == kept + 1 else np.zeros(kept)
         unscaled = self._unscaled(np.maximum(weights, 0.0))
-        return Interior(self.flat.lift(point[:-1]), _uncapped(point[-1], cap), unscaled, answer.status == "optimal")
+        return Interior(self.flat.lift(point[:-1] * self.columns), _uncapped(point[-1], cap), unscaled, answer.status == "optimal")
 
     @cached_property
     def thin(self) -> bool:
         """Whether the set is so thin (or so nearly empty) that only exact arithmetic can say that it has a point."""
         interior = self.interior
         return self.AT.shape[0] == 0 or not interior.reliable or interior.radius <= _THIN * self.size
+
+    @cached_property
+    def centre(self) -> Floats:
+        """The centre of a largest ball in the coordinates of AT."""
+        point: Floats = self.interior.point[self.flat.free] / self.columns
+        return point
+
+    @cached_property
+    def balanced(self) -> "Program":
+        """The same program in coordinates in which the set is about as wide along each axis, by powers of two.
+
+        The program itself if it may be as it is.  Its largest ball, if it has been scaled, is one of the scaled set.
+        """
+        free = self.AT.shape[0]
+        if free < 2 or not self.consistent or not self._small or self.interior.radius > _SMALL_BALL * self.size:
+            return self
+        program = self
+        for _ in range(3):
+            widths = program._widths()
+            if widths.max() <= _UNEVEN * widths.min():
+                break
+            program = program._scaled(np.ldexp(1.0, np.frexp(widths)[1]))
+        return program
+
+    def _widths(self) -> Floats:
+        """Widths (free,) along the axes of AT; the rows' steepest entry tells an infinite one, the others a hidden one."""
+        axes = np.eye(len(self.columns))
+        points, _, status = self._solve(np.vstack([axes, -axes]))
+        solved = np.array([name == OPTIMAL for name in status])
+        upper, lower = np.split(np.where(solved[:, None], points, np.nan), 2)
+        widths = np.diag(upper) - np.diag(lower)
+        rest = np.maximum(self.rhs - self.centre @ self.AT, _NOISE * self.size)
+        steepest = (np.abs(self.AT) / rest).max(axis=1)
+        widths = np.where(np.isnan(widths) & (steepest > 0.0), 1.0 / np.maximum(steepest, 1e-30), widths)
+        size = np.abs(np.where(solved[:, None], points, 0.0)).max(axis=0, initial=float(np.abs(self.centre).max()))
+        known = widths > _NOISE * size
+        return np.where(known, widths, widths[known].max() if known.any() else 1.0)
+
+    def _scaled(self, factors: Floats) -> "Program":
+        AT = self.AT * factors[:, None]
+        change = np.ldexp(1.0, -np.frexp(np.linalg.norm(AT, axis=0))[1])
+        AT = AT * change
+        return replace(
+            self, AT=AT, rhs=self.rhs * change, norms=np.linalg.norm(AT, axis=0), scale=self.scale * change,
+            columns=self.columns * factors,
+        )  # fmt: skip
 
     def maximise(self, directions: Floats) -> Maxima:
         """Maxima of ``directions x`` over the set, which must not be empty.
@@ -164,25 +219,30 @@ class Program:
         ----------
         directions : array (k, n)
         """
-        k, free = directions.shape[0], self.AT.shape[0]
-        reduced = np.ascontiguousarray(self.flat.restrict(directions, np.zeros(k))[0])
-        points, weights = np.zeros((k, free)), np.zeros((k, self.kept.size))
-        status = [OPTIMAL] * k if free == 0 else [UNDECIDED] * k
-        if free and self._small:
-            status = self._maximise_by_kernel(reduced, points, weights)
-        lifted, multipliers = self.flat.lift(points), np.zeros((k, self.b.size))
-        multipliers[:, self.kept] = weights * self.scale
+        program = self.balanced
+        k, free = directions.shape[0], program.AT.shape[0]
+        reduced = np.ascontiguousarray(self.flat.restrict(directions, np.zeros(k))[0] * program.columns)
+        points, weights, status = program._solve(reduced)
+        lifted, multipliers = self.flat.lift(points * program.columns), np.zeros((k, self.b.size))
+        multipliers[:, self.kept] = weights * program.scale
         solved = np.array([name == OPTIMAL for name in status], dtype=bool)
         values = np.where(solved, (directions * lifted).sum(axis=1), np.inf)
         for q in np.flatnonzero(~solved).tolist():
             if status[q] == UNDECIDED:
-                status[q], values[q], lifted[q], multipliers[q] = self._maximise_carefully(directions[q], reduced[q])
+                status[q], values[q], lifted[q], multipliers[q] = program._maximise_carefully(directions[q], reduced[q])
         return Maxima(values, lifted, multipliers, status)
+
+    def _solve(self, reduced: Floats) -> tuple[Floats, Floats, list[str]]:
+        """Points (k, free) and multipliers (k, kept) in the coordinates of AT by the kernel, and the status of each."""
+        k, free = reduced.shape
+        points, weights = np.zeros((k, free)), np.zeros((k, self.kept.size))
+        if free and self._small:
+            return points, weights, self._maximise_by_kernel(reduced, points, weights)
+        return points, weights, [OPTIMAL if free == 0 else UNDECIDED] * k
 
     def _maximise_by_kernel(self, reduced: Floats, points: Floats, weights: Floats) -> list[str]:
         warm_up()
-        start = self.interior.point[self.flat.free]
-        points[:], active, y, status = kernel.supports(self.AT, self.rhs, start, reduced)
+        points[:], active, y, status = kernel.supports(self.AT, self.rhs, self.centre, reduced)
         row, slot = np.nonzero(active >= 0)
         weights[row, active[row, slot]] = y[row, slot]
         return [_NAMES.get(code, UNDECIDED) for code in status.tolist()]
@@ -200,7 +260,7 @@ class Program:
                     return UNBOUNDED, np.inf, nowhere, nothing
         answer = self._highs.maximise(reduced)
         if answer.status == "optimal" and self._optimal(reduced, answer.point, answer.multipliers):
-            point = self.flat.lift(answer.point)
+            point = self.flat.lift(answer.point * self.columns)
             return OPTIMAL, float(direction @ point), point, self._unscaled(answer.multipliers)
         if answer.status == "unbounded":
             return UNBOUNDED, np.inf, nowhere, nothing
@@ -242,7 +302,7 @@ def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
     lengths = _metric_norms(rows, flat)
     violated = int(failing[0]) if failing.size else None
     AT = np.ascontiguousarray(rows.T)
-    return Program(A, b, flat, AT, rhs[kept] * scale, lengths, scale, kept, violated)
+    return Program(A, b, flat, AT, rhs[kept] * scale, lengths, scale, np.ones(len(flat.free)), kept, violated)
 
 
 def _uncapped(radius: float, cap: float) -> float:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.affine_hull import explicit
-from polytopes.errors import UnboundedError
-from polytopes.frame import unit_frame
+from polytopes.errors import UnboundedError, UndecidedError
+from polytopes.frame import UnitBody, unit_body
+from polytopes.qhull import dual_hull
 from polytopes.redundancy import facets
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
@@ -34,14 +35,14 @@ def vertices(P: Rows) -> Floats:
     if not is_bounded(P):
         raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
     flat = explicit(P)
-    program = flat.program
+    program = flat.program.balanced
     free = program.flat.free
     if not free:
         return program.flat.point[None].copy()
     chosen = np.searchsorted(program.kept, facets(program))
     rows, rhs = np.ascontiguousarray(program.AT[:, chosen].T), program.rhs[chosen]
-    z = _interval_ends(rows, rhs) if len(free) == 1 else _vertices_in_frame(rows, rhs)
-    lifted: Floats = program.flat.lift(z)
+    z = _interval_ends(rows, rhs) if len(free) == 1 else _vertices_in_frame(rows, rhs, program.centre)
+    lifted: Floats = program.flat.lift(z * program.columns)
     return lifted
 
 
@@ -50,20 +51,18 @@ def _interval_ends(rows: Floats, rhs: Floats) -> Floats:
     return np.sort(ends)[:, None]
 
 
-def _vertices_in_frame(rows: Floats, rhs: Floats) -> Floats:
+def _vertices_in_frame(rows: Floats, rhs: Floats, inner: Floats) -> Floats:
     """Vertices of a bounded, full-dimensional set, by the dual hull in coordinates where it is about a unit ball."""
-    from scipy.spatial import HalfspaceIntersection
+    body = unit_body(rows, rhs, inner)
+    if body is None:
+        raise UndecidedError("cannot list the vertices: the set is too thin for coordinates in which it is round.")
+    return body.lift(listed(body))
 
-    program = Rows(rows, rhs).program
-    centre = program.interior.point
-    frame = unit_frame(lambda directions: program.maximise(directions).points, centre)
-    scaled, room = rows @ frame, rhs - rows @ centre
-    lengths = np.linalg.norm(scaled, axis=1)
-    scaled, room = scaled / lengths[:, None], room / lengths
-    inner = Rows(scaled, room).program.interior.point
-    hull = HalfspaceIntersection(np.hstack([scaled, -room[:, None]]), inner)
-    points = _merged(_corners(scaled, room, hull.dual_facets, hull.intersections))
-    return centre + points @ frame.T
+
+def listed(body: UnitBody) -> Floats:
+    """Vertices of a body in its own coordinates."""
+    active, guesses = dual_hull(body.rows, body.rhs, body.inner)
+    return _merged(_corners(body.rows, body.rhs, active, guesses))
 
 
 def _corners(rows: Floats, rhs: Floats, active: list[list[int]], guesses: Floats) -> Floats:

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_programs import KINDS, many
 
-from polytopes import Certificate, HPolytope, UndecidedError
-from polytopes import simplex_kernel as kernel
+from polytopes import Certificate, HPolytope, UndecidedError, kernel
 from polytopes.exact import refutes
 from polytopes.highs import HighsOutcome, HighsProgram
 

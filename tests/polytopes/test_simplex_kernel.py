@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from random_programs import KINDS, many
 
-from polytopes import HPolytope
-from polytopes import simplex_kernel as kernel
+from polytopes import HPolytope, kernel
 from polytopes.highs import HighsProgram
 from polytopes.linear_program import prepare
 
