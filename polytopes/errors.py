@@ -38,9 +38,11 @@ def as_array(name: str, value: ArrayLike, ndim: int, *, finite: bool = True) -> 
     array = np.array(raw, dtype=np.float64, order="C")
     if array.ndim != ndim:
         raise ValueError(f"{name} has shape {array.shape}; expected an array of {ndim} dimension(s).")
+    if np.isfinite(array).all():
+        return array
     if np.isnan(array).any():
         raise ValueError(f"{name} contains NaN; expected numbers. Remove or replace the missing entries.")
-    if finite and not np.isfinite(array).all():
+    if finite:
         raise ValueError(f"{name} contains an infinity; expected finite numbers. Leave out a row that does not bound.")
     return array
 

@@ -140,7 +140,7 @@ def _indices_fit(multipliers: Multipliers, rows: NDArray[np.float64]) -> bool:
 def substituted(
     A: NDArray[np.float64], b: NDArray[np.float64], point: NDArray[np.float64], basis: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rows ``A x <= b`` in z with ``x = point + basis z``, each entry rounded once: those that cancel are formed exactly.
+    """Rows ``A x <= b`` in z with ``x = point + basis z``, each entry rounded once (exact where terms cancel).
 
     Rows come scaled by powers of two, to about unit norm.
 

@@ -22,8 +22,12 @@ Floats = NDArray[np.float64]
 _LOG = logging.getLogger("polytopes")
 
 
-def eliminate(A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows: int) -> tuple[Floats, Floats]:
+def eliminate(
+    A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows: int, cautious: bool = False
+) -> tuple[Floats, Floats]:
     """Rows of the projection of a full-dimensional set along some coordinates.
+
+    The logger ``polytopes`` reports each step at level INFO, a long one as soon as it is done.
 
     Parameters
     ----------
@@ -34,6 +38,8 @@ def eliminate(A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows:
         A point strictly inside.
     max_rows : int
         Limit on the rows of one step, before pruning.
+    cautious : bool
+        Whether to give up already where dense rows would reach the limit in the step after the next.
 
     Returns
     -------
@@ -46,27 +52,34 @@ def eliminate(A: Floats, b: Floats, columns: list[int], inner: Floats, max_rows:
         If one step would form more than `max_rows` rows.
     """
     warm_up()
-    left = list(range(A.shape[1]))
-    table = np.hstack([A, b[:, None]])[A.any(axis=1)]
-    table = _settled(kernel.pruned(table, inner), inner)
-    for done in range(len(columns)):
-        candidates = np.array([k for k, j in enumerate(left) if j in columns])
-        j, formed = kernel.cheapest(table, candidates)
-        if formed > max_rows:
+    table = np.column_stack([A, b])
+    if not A.any(axis=1).all():
+        table = table[A.any(axis=1)]
+    inner, left, rest = np.ascontiguousarray(inner), np.arange(A.shape[1]), np.array(columns, dtype=np.int64)
+    table, doubtful = kernel.pruned(table, inner)
+    table = _settled(table, doubtful, inner)
+    done, state = 0, kernel.PAUSED
+    while state != kernel.FINISHED:
+        table, left, rest, inner, doubtful, trace, formed, state = kernel.eliminate(
+            table, left, rest, inner, max_rows, cautious
+        )
+        if _LOG.isEnabledFor(logging.INFO):
+            for made, kept in trace:
+                done += 1
+                _LOG.info("eliminated variable %d of %d: %d rows formed, %d kept", done, len(columns), made, kept)
+        if state == kernel.TOO_MANY:
             raise ProjectionLimitError(
-                f"eliminating variable {done + 1} of {len(columns)} would form {formed} rows from {len(table)}, more "
-                f"than max_rows={max_rows}; raise the limit, use outer=True for a superset, or another method."
+                f"eliminating variable {len(columns) - rest.size + 1} of {len(columns)} would form {formed} rows from "
+                f"{len(table)}, more than max_rows={max_rows}; raise the limit, use outer=True for a superset, or "
+                "another method."
             )
-        del left[j]
-        inner = np.delete(inner, j)
-        table = _settled(kernel.step(table, j, formed, inner), inner)
-        _LOG.info("eliminated variable %d of %d: %d rows formed, %d kept", done + 1, len(columns), formed, len(table))
+        if state == kernel.OPEN:
+            table = _settled(table, doubtful, inner)
     return table[:, :-1], table[:, -1]
 
 
-def _settled(answer: tuple[Floats, NDArray[np.int64]], inner: Floats) -> Floats:
+def _settled(table: Floats, doubtful: NDArray[np.int64], inner: Floats) -> Floats:
     """The facets among rows ``[A, b]``, some of which the kernel may have left open."""
-    table, doubtful = answer
     if doubtful.any():
-        table = table[settle(table[:, :-1], table[:, -1], inner, doubtful)]
+        table = np.ascontiguousarray(table[settle(table[:, :-1], table[:, -1], inner, doubtful)])
     return table

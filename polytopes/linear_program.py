@@ -53,10 +53,9 @@ def warm_up() -> None:
         kernel.interior(AT, b, norms, np.zeros(1), 1.0)
         kernel.supports(AT, b, np.zeros(1), np.ones((1, 1)))
         kernel.irredundant(AT, b, np.zeros(1))
-        table = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]])
-        kernel.cheapest(table, np.zeros(1, np.int64))
+        table, names = np.array([[1.0, 1.0, 1.0], [-1.0, 0.0, 1.0], [0.0, -1.0, 1.0]]), np.arange(2)
         kernel.pruned(table, np.zeros(2))
-        kernel.step(table, 0, 1, np.zeros(1))
+        kernel.eliminate(table, names, names[:1], np.zeros(2), 10, False)
     finally:
         announce.cancel()
 
@@ -148,7 +147,8 @@ class Program:
             if status == kernel.OPTIMAL:
                 weights = np.zeros(kept + 1)
                 weights[active[active >= 0]] = y[active >= 0]
-                return Interior(self.flat.lift(z * self.columns), _uncapped(radius, cap), self._unscaled(weights[:kept]), True)
+                proof = self._unscaled(weights[:kept])
+                return Interior(self.flat.lift(z * self.columns), _uncapped(radius, cap), proof, True)
         return self._interior_by_highs(cap)
 
     def _interior_by_highs(self, cap: float) -> Interior:
@@ -157,8 +157,8 @@ class Program:
         answer = HighsProgram(rows, np.append(self.rhs, cap)).maximise(np.append(np.zeros(free), 1.0))
         point = answer.point if answer.point.size == free + 1 else np.zeros(free + 1)
         weights = answer.multipliers[:kept] if answer.multipliers.size == kept + 1 else np.zeros(kept)
-        unscaled = self._unscaled(np.maximum(weights, 0.0))
-        return Interior(self.flat.lift(point[:-1] * self.columns), _uncapped(point[-1], cap), unscaled, answer.status == "optimal")
+        proof, centre = self._unscaled(np.maximum(weights, 0.0)), self.flat.lift(point[:-1] * self.columns)
+        return Interior(centre, _uncapped(point[-1], cap), proof, answer.status == "optimal")
 
     @cached_property
     def thin(self) -> bool:
@@ -190,7 +190,7 @@ class Program:
         return program
 
     def _widths(self) -> Floats:
-        """Widths (free,) along the axes of AT; the rows' steepest entry tells an infinite one, the others a hidden one."""
+        """Widths (free,) along the axes of AT: an infinite one by the steepest entry, a hidden one the largest."""
         axes = np.eye(len(self.columns))
         points, _, status = self._solve(np.vstack([axes, -axes]))
         solved = np.array([name == OPTIMAL for name in status])
@@ -220,7 +220,7 @@ class Program:
         directions : array (k, n)
         """
         program = self.balanced
-        k, free = directions.shape[0], program.AT.shape[0]
+        k = directions.shape[0]
         reduced = np.ascontiguousarray(self.flat.restrict(directions, np.zeros(k))[0] * program.columns)
         points, weights, status = program._solve(reduced)
         lifted, multipliers = self.flat.lift(points * program.columns), np.zeros((k, self.b.size))
@@ -293,16 +293,17 @@ def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
     """
     flat = affine_set(C, d)
     rows, rhs = flat.restrict(A, b)
-    norms = np.linalg.norm(rows, axis=1)
-    constant = norms == 0.0
-    failing = np.flatnonzero(constant & (rhs < 0.0))
-    kept = np.flatnonzero(~constant)
-    scale = np.ldexp(1.0, -np.frexp(norms[kept])[1])
-    rows = rows[kept] * scale[:, None]
-    lengths = _metric_norms(rows, flat)
-    violated = int(failing[0]) if failing.size else None
-    AT = np.ascontiguousarray(rows.T)
-    return Program(A, b, flat, AT, rhs[kept] * scale, lengths, scale, np.ones(len(flat.free)), kept, violated)
+    norms = np.sqrt((rows * rows).sum(axis=1))
+    kept, violated = np.arange(b.size), None
+    if not norms.all():
+        failing = np.flatnonzero((norms == 0.0) & (rhs < 0.0))
+        violated = int(failing[0]) if failing.size else None
+        kept = np.flatnonzero(norms)
+        rows, rhs, norms = rows[kept], rhs[kept], norms[kept]
+    scale = np.ldexp(1.0, -np.frexp(norms)[1])
+    AT = np.ascontiguousarray(rows.T) * scale
+    lengths = norms * scale if not flat.pivots else _metric_norms(AT.T, flat)
+    return Program(A, b, flat, AT, rhs * scale, lengths, scale, np.ones(len(flat.free)), kept, violated)
 
 
 def _uncapped(radius: float, cap: float) -> float:
@@ -311,8 +312,6 @@ def _uncapped(radius: float, cap: float) -> float:
 
 def _metric_norms(rows: Floats, flat: AffineSet) -> Floats:
     """Norms of the rows (in free coordinates) measured in x, along the affine set."""
-    if not flat.pivots:
-        return np.linalg.norm(rows, axis=1)
     if not flat.free:
         return np.ones(len(rows))
     gram = np.linalg.cholesky(flat.basis.T @ flat.basis)

@@ -34,6 +34,7 @@ Floats = NDArray[np.float64]
 METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
 _CHEAP_ROWS = 1000  # rows of one step; beyond, another method was faster in every measured case
 _LISTED = 6  # coordinates up to which the vertices of dense rows are few enough to list
+_FEW = 5  # coordinates up to which listing them always was the fastest
 _COSTLY_SHADOW = 4  # coordinates of a shadow from which one hull of all vertices beats several of support points
 
 
@@ -65,6 +66,11 @@ def project(
     if not known_nonempty(P):
         return np.zeros((1, k)), np.array([-1.0]), np.empty((0, k)), np.empty(0)
     P = explicit(P)
+    if not P.d.size and P.A.any(axis=1).all():
+        order = [*keep, *(j for j in range(n) if j not in keep)]
+        body = P if order == list(range(n)) else Rows(P.A[:, order], P.b)
+        A, b = _project_body(body, k, P.program.interior.point[order], method, max_rows, outer)
+        return A, b, np.empty((0, k)), np.empty(0)
     gone = [j for j in range(n) if j not in keep]
     flat = affine_set(P.C, P.d, first=gone)
     C, d = _equalities_left(flat, keep)
@@ -114,7 +120,7 @@ def _project_body(
 def _project_automatically(P: Rows, k: int, inner: Floats, max_rows: int, outer: bool) -> tuple[Floats, Floats]:
     """Fourier-Motzkin as long as it stays cheap; then one of the hulls, if there is one."""
     try:
-        return eliminate(P.A, P.b, list(range(k, P.dim)), inner, min(max_rows, _CHEAP_ROWS))
+        return eliminate(P.A, P.b, list(range(k, P.dim)), inner, min(max_rows, _CHEAP_ROWS), cautious=True)
     except ProjectionLimitError:
         return _project_body(P, k, inner, _method_for_dense_rows(P, k), max_rows, outer)
 
@@ -126,7 +132,8 @@ def _method_for_dense_rows(P: Rows, k: int) -> str:
     finite = np.isfinite(result.values)
     if not finite[: 2 * k].all():
         return "fourier-motzkin"
-    return "vertices" if finite.all() and P.dim <= _LISTED and k >= _COSTLY_SHADOW else "convex-hull"
+    listed = P.dim <= _FEW or (P.dim <= _LISTED and k >= _COSTLY_SHADOW)
+    return "vertices" if finite.all() and listed else "convex-hull"
 
 
 def _shadow_points(P: Rows, directions: Floats) -> Floats:

@@ -3,23 +3,27 @@
 simplex      the primal simplex method in inequality form
 programs     largest ball, support points
 facets       redundancy of rows
-elimination  one step of Fourier-Motzkin
+elimination  Fourier-Motzkin elimination
 entries      what Python calls
 """
 
-from polytopes.kernel.entries import cheapest, interior, irredundant, pruned, step, supports
+from polytopes.kernel.elimination import FINISHED, OPEN, PAUSED, TOO_MANY
+from polytopes.kernel.entries import eliminate, interior, irredundant, pruned, supports
 from polytopes.kernel.simplex import AMBIGUOUS, LIMIT, OPTIMAL, STOPPED, UNBOUNDED
 
 __all__ = [
     "AMBIGUOUS",
+    "FINISHED",
     "LIMIT",
+    "OPEN",
     "OPTIMAL",
+    "PAUSED",
     "STOPPED",
+    "TOO_MANY",
     "UNBOUNDED",
-    "cheapest",
+    "eliminate",
     "interior",
     "irredundant",
     "pruned",
-    "step",
     "supports",
 ]

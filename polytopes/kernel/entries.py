@@ -8,7 +8,7 @@ from polytopes.kernel import elimination, facets, programs
 from polytopes.kernel.sources import SOURCES
 
 _interior, _supports, _irredundant = programs.interior, programs.supports, facets.irredundant
-_cheapest, _pruned, _step = elimination.cheapest, elimination.pruned, elimination.step
+_pruned, _eliminate = elimination.pruned, elimination.eliminate
 
 
 def _compiled(sources: str) -> tuple[Any, ...]:
@@ -28,21 +28,16 @@ def _compiled(sources: str) -> tuple[Any, ...]:
         return _irredundant(AT, b, x0)
 
     @njit(cache=True)
-    def cheapest(table, columns):
-        sources  # noqa: B018
-        return _cheapest(table, columns)
-
-    @njit(cache=True)
     def pruned(table, inner):
         sources  # noqa: B018
         return _pruned(table, inner)
 
     @njit(cache=True)
-    def step(table, j, formed, inner):
+    def eliminate(table, left, columns, inner, max_rows, cautious):
         sources  # noqa: B018
-        return _step(table, j, formed, inner)
+        return _eliminate(table, left, columns, inner, max_rows, cautious)
 
-    return interior, supports, irredundant, cheapest, pruned, step
+    return interior, supports, irredundant, pruned, eliminate
 
 
-interior, supports, irredundant, cheapest, pruned, step = _compiled(SOURCES)
+interior, supports, irredundant, pruned, eliminate = _compiled(SOURCES)

@@ -28,7 +28,10 @@ from polytopes.kernel.simplex import (
 
 _TOLERANCE = 1e-12  # of a row's slack at the inner point: growth that counts as none
 _CLEAR = 1e-9  # of the slack: beyond, no vertex need be found (Harris' tolerance is 1e-11)
+_BELOW = 1e-10  # violation, of the slack, that a point clearly outside a row may have of the others
+_FLAT_ROW = 1e-6  # steepest entry of a row, of one elsewhere, below which a ray may be an effect of rounding
 _CLARKSON_FROM = 24  # rows; below, one program per row is faster
+_WALK_UP_TO = 64  # rows; beyond, the programs over facets alone cost less than further steps among all rows
 _SPLIT = 134217729.0  # 2^27 + 1, halves a float (Dekker 1971)
 _NO, _YES, _DOUBT = 0, 1, 2
 
@@ -100,6 +103,18 @@ def _rounding(AT: Matrix, b: Vector, c: Vector, x: Vector, W: Index, y: Vector) 
 
 
 @njit(error_model="numpy", fastmath=FAST)
+def _even(AT: Matrix) -> bool:
+    """Whether no row of the centred set is much flatter than others: no set far longer than it is wide."""
+    for i in range(AT.shape[1]):
+        steepest = 0.0
+        for j in range(AT.shape[0]):
+            steepest = max(steepest, abs(AT[j, i]))
+        if steepest < _FLAT_ROW:
+            return False
+    return True
+
+
+@njit(error_model="numpy", fastmath=FAST)
 def _exceeds(AT: Matrix, b: Vector, c: Vector, slack: float, x: Vector, origin: Vector) -> int:
     """Whether ``c'x`` exceeds ``(1 + 1e-12) slack`` in the centred set; x is such a point unless it is unbounded."""
     d, m = AT.shape
@@ -107,12 +122,20 @@ def _exceeds(AT: Matrix, b: Vector, c: Vector, slack: float, x: Vector, origin: 
     start(AT, b, origin, x, s, W, Q)
     status = ascend(AT, b, c, x, s, W, Q, y, 1.0, slack * (1.0 + _CLEAR))
     if status == STOPPED:
-        return _YES
+        return _YES if s.min() > -_BELOW else _DOUBT  # a row whose rate was masked may lie behind
     if status == UNBOUNDED:
         for j in range(d):
             x[j] = c[j]
-        return _YES
-    if status != OPTIMAL or repair(AT, b, x, s, W, Q, y, 1.0) != OPTIMAL:
+        return _YES if _even(AT) else _DOUBT
+    if status != OPTIMAL:
+        return _DOUBT
+    bound = 0.0
+    for k in range(d):
+        if W[k] >= 0:
+            bound += y[k] * b[W[k]]
+    if bound + _rounding(AT, b, c, x, W, y) < slack * (1.0 - _CLEAR):  # by duality
+        return _NO
+    if repair(AT, b, x, s, W, Q, y, 1.0) != OPTIMAL:
         return _DOUBT
     over = -slack * (1.0 + _TOLERANCE)
     for j in range(d):
@@ -158,6 +181,70 @@ def _first_hit(AT: Matrix, b: Vector, p: Vector) -> tuple[int, bool]:
 
 
 @njit(error_model="numpy", fastmath=FAST)
+def _walk(AT: Matrix, b: Vector, i: int, state: Index, basis: Matrix, s: Vector) -> None:
+    """Mark as kept the rows that a walk from the origin towards row i meets, each alone: they are facets.
+
+    It goes along the row's normal, then within the facets it has met, as long as the next one is met by itself.
+    """
+    d, m = AT.shape
+    p = np.empty(d)
+    for q in range(m):
+        s[q] = b[q]
+    for met in range(d if m <= _WALK_UP_TO else 1):
+        length = 0.0
+        for j in range(d):
+            p[j] = AT[j, i]
+            length += p[j] * p[j]
+        for k in range(met):
+            along = 0.0
+            for j in range(d):
+                along += p[j] * basis[k, j]
+            for j in range(d):
+                p[j] -= along * basis[k, j]
+        square = 0.0
+        for j in range(d):
+            square += p[j] * p[j]
+        if square <= 1e-6 * length:
+            return
+        row, step, second = -1, np.inf, np.inf
+        for q in range(m):
+            rate = 0.0
+            for j in range(d):
+                rate += AT[j, q] * p[j]
+            if rate * step > s[q]:
+                row, step, second = q, s[q] / rate, step
+            elif rate * second > s[q]:
+                second = s[q] / rate
+        if row < 0 or second <= step * (1.0 + 1e-6) or step <= 0.0:
+            return
+        state[row] = 1
+        if row == i:
+            return
+        for q in range(m):
+            rate = 0.0
+            for j in range(d):
+                rate += AT[j, q] * p[j]
+            s[q] -= step * rate
+        s[row] = np.inf  # the walk stays on it
+        square = 0.0
+        for j in range(d):
+            basis[met, j] = AT[j, row]
+        for k in range(met):
+            along = 0.0
+            for j in range(d):
+                along += basis[met, j] * basis[k, j]
+            for j in range(d):
+                basis[met, j] -= along * basis[k, j]
+        for j in range(d):
+            square += basis[met, j] * basis[met, j]
+        if square <= 1e-6:
+            return
+        inverse = 1.0 / np.sqrt(square)
+        for j in range(d):
+            basis[met, j] *= inverse
+
+
+@njit(error_model="numpy", fastmath=FAST)
 def _clarkson(AT: Matrix, b: Vector) -> tuple[Index, Index]:
     """Programs only over rows already known to be facets; a violation finds a new facet by a ray (Clarkson 1994).
 
@@ -167,13 +254,10 @@ def _clarkson(AT: Matrix, b: Vector) -> tuple[Index, Index]:
     state = np.zeros(m, np.int64)  # 0 open, 1 kept, 2 redundant
     doubtful = np.zeros(m, np.int64)
     c, x, origin = np.empty(d), np.empty(d), np.zeros(d)
+    basis, s = np.empty((d, d)), np.empty(m)
     for i in range(m):
         if state[i] == 0:
-            for j in range(d):
-                c[j] = AT[j, i]
-            row, tie = _first_hit(AT, b, c)
-            if row >= 0 and not tie:
-                state[row] = 1
+            _walk(AT, b, i, state, basis, s)
     facets, values = np.empty((d, m)), np.empty(m)
     n = 0
     for i in range(m):
