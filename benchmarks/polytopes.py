@@ -4,7 +4,8 @@ Run with ``OPENBLAS_NUM_THREADS=1 python -m benchmarks.polytopes``: the times ar
 runs, and threads that wait would count.  Peers are cdd, HiGHS (one warm program per row), the Parma library (exact) and
 the library polytope, each where it is installed and ends in reasonable time.  The agreement column is the largest
 difference of support functions in 200 directions.  Fresh processes measure the import, the first compilation and the
-memory of a dense projection.  ``--out DIR`` also writes the table as text and as a picture.
+memory of a dense projection.  The table goes to ``polytopes.txt`` and a picture to ``polytopes.png``, in the folder
+``build/benchmarks`` or the one of ``--out``.
 """
 
 import argparse
@@ -280,8 +281,11 @@ def costs_of_a_process() -> str:
     )
 
 
-def main(out: Path | None = None) -> None:
-    """Measure, print, and write to a folder if there is one."""
+OUT = Path("build/benchmarks")
+
+
+def main(out: Path = OUT) -> None:
+    """Measure, print, and write the table and its picture to a folder."""
     warm_up()
     cases = [
         *(redundancy(n, 200) for n in (4, 6, 8)),
@@ -293,16 +297,16 @@ def main(out: Path | None = None) -> None:
         hull(4, 50),
     ]
     timings = [timing for case in cases for timing in measure(case)]
-    console = Console(width=140, record=out is not None)
+    console = Console(width=140, record=True)
     console.print(results_table(timings))
     console.print(costs_of_a_process())
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "polytopes.txt").write_text(console.export_text())
-        draw(timings, out / "polytopes.png")
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "polytopes.txt").write_text(console.export_text())
+    draw(timings, out / "polytopes.png")
+    print(f"written to {out}")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, help="folder for the table and the picture")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for the table and the picture")
     main(parser.parse_args().out)

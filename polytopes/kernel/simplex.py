@@ -30,7 +30,6 @@ _CERTAIN = 1e-11  # relative reduced cost below which a ray may be an effect of 
 _HARRIS = 1e-11  # ratio-test tolerance, relative to the size of b
 _REFACTOR = 40  # pivots between two fresh inverses
 EPS = 2.220446049250313e-16
-_FAR = 1e9  # a row this many times farther out than half of the rows is no measure of the set
 FAST = {"nnan", "nsz", "reassoc", "contract"}
 
 
@@ -301,11 +300,8 @@ def start(AT: Matrix, b: Vector, x0: Vector, x: Vector, s: Vector, W: Index, Q: 
 
 @njit
 def scale_of(b: Vector) -> float:
-    """Size that tolerances refer to: the largest |b| (1 for a cone); rows far beyond most others do not count."""
-    if b.size == 0:
-        return 1.0
-    sizes = np.abs(b)
-    largest, middle = sizes.max(), np.median(sizes)
-    if middle > 0.0:
-        largest = min(largest, _FAR * middle)
+    """Size that tolerances refer to: the largest |b| (1 for a cone)."""
+    largest = 0.0
+    for i in range(b.shape[0]):
+        largest = max(largest, abs(b[i]))
     return largest if largest > 0.0 else 1.0

@@ -1,0 +1,110 @@
+"""Cases on which floating-point libraries are known to be wrong, one named test each."""
+
+import itertools
+
+import numpy as np
+import pytest
+from exact_sets import minimal_size, polyhedron
+from sets import CATALOGUE, EMPTY
+
+from polytopes import Certificate, HPolytope, UnboundedError, convex_hull
+
+
+def test_a_thin_rectangle_has_four_vertices() -> None:
+    for width in (1e-7, 1e-9, 1e-12):
+        V = HPolytope.box([0.0, 0.0], [1.0, width]).vertices()
+        np.testing.assert_array_equal(V[np.lexsort(V.T)], [[0.0, 0.0], [1.0, 0.0], [0.0, width], [1.0, width]])
+
+
+def test_columns_of_different_scales_lose_no_vertices() -> None:
+    rng = np.random.default_rng(0)
+    A = rng.standard_normal((40, 4))
+    even = HPolytope(A, np.ones(40))
+    uneven = HPolytope(A / 2.0 ** np.array([0, 7, 13, 20]), np.ones(40))
+    assert len(uneven.vertices()) == len(even.vertices()) > 50
+
+
+@pytest.mark.parametrize("apart", [1e-8, 1e-11])
+def test_rows_close_to_each_other_both_count(apart: float) -> None:
+    P = HPolytope([[1.0, 0.0], [1.0, apart], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0] * 5)
+    assert P.remove_redundancy().b.size == minimal_size(polyhedron(P))[0] == 5
+    assert len(P.vertices()) == (5 if apart > 1e-9 else 4)  # corners closer than 1e-9 of the size are one
+
+
+def test_a_coefficient_of_1e_8_is_kept() -> None:
+    P = HPolytope([[1e-8, 1.0], [0.0, -1.0], [-1.0, 0.0]], [1.0, 0.0, 0.0])
+    assert P.support([1.0, 0.0]) == 1e8
+    assert P.is_bounded()
+    assert P.project([0]).bounding_box()[1] == pytest.approx(1e8)
+    assert len(P.vertices()) == 3
+
+
+def test_points_are_not_rounded_before_the_hull() -> None:
+    """Corners of a turned cube: rounding them first would split its faces."""
+    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((4, 4)))[0]
+    corners = np.array(list(itertools.product([0.0, 1.0], repeat=4))) @ turn
+    assert HPolytope.from_vertices(corners).b.size == 8
+
+
+def test_the_empty_set_has_no_dual_hull() -> None:
+    for name in EMPTY:
+        P = CATALOGUE[name]
+        assert P.vertices().shape == (0, P.dim)
+        assert P.volume() == 0.0
+        assert convex_hull([P, P]).emptiness().status == "empty"
+
+
+def test_an_unbounded_set_gives_no_nan() -> None:
+    P = CATALOGUE["wedge"]
+    with pytest.raises(UnboundedError):
+        P.vertices()
+    assert P.volume() == np.inf
+    G = P.generators()
+    assert np.isfinite(np.vstack([G.vertices, G.rays, G.lines])).all()
+
+
+def test_a_small_radius_is_not_empty_and_a_small_gap_is() -> None:
+    for size in (1e-6, 1e-8, 1e-12, 1e-15):
+        assert HPolytope.box([0.0, 1.0], [size, 1.0 + 2.0**-52]).emptiness().status == "nonempty"
+        assert HPolytope.box([size, 0.0], [0.0, 1.0]).emptiness().status == "empty"
+
+
+def test_an_equality_stays_an_equality() -> None:
+    P = HPolytope.box([-1.0] * 3, [1.0] * 3).intersection(HPolytope(np.zeros((0, 3)), [], [[1.0, 1e-9, 0.0]], [0.5]))
+    for Q in (P.remove_redundancy(), P.project([0, 1]), P.minkowski_sum(HPolytope.box([0.0] * 3, [0.0] * 3))):
+        assert Q.d.size == 1
+        assert Q.affine_dim() == Q.dim - 1
+
+
+def test_emptiness_is_decided_on_every_kind_of_set_and_its_proof_stands_alone() -> None:
+    for name, P in CATALOGUE.items():
+        answer = P.emptiness()
+        assert answer.status == ("empty" if name in EMPTY else "nonempty")
+        if answer.certificate is not None:
+            assert Certificate.from_dict(answer.certificate.to_dict()).verify(HPolytope(P.A, P.b, P.C, P.d))
+
+
+def test_generators_agree_with_cdd_in_scaled_coordinates() -> None:
+    cdd = pytest.importorskip("cdd", reason="needs pycddlib: pip install 'svo-fdi[cdd]'")
+    from polytopes.conversions import to_cdd
+
+    for trial in range(60):
+        rng = np.random.default_rng(trial)
+        n = int(rng.integers(2, 5))
+        P = random_unbounded(rng, n)
+        G = P.generators()
+        found = cdd.copy_generators(cdd.polyhedron_from_matrix(to_cdd(P)))
+        table = np.array(found.array).reshape(-1, n + 1)
+        lines = len(found.lin_set)
+        assert len(G.lines) == lines
+        if lines == 0:
+            assert len(G.vertices) == np.count_nonzero(table[:, 0] == 1.0)
+            assert len(G.rays) == np.count_nonzero(table[:, 0] == 0.0)
+
+
+def random_unbounded(rng: np.random.Generator, n: int) -> HPolytope:
+    """Few integer rows around the origin: mostly unbounded, sometimes with lines."""
+    m = int(rng.integers(max(1, n - 1), n + 4))
+    A = rng.integers(-3, 4, (m, n)).astype(float)
+    A = A[A.any(axis=1)]
+    return HPolytope(A, rng.integers(1, 5, len(A)))
