@@ -218,6 +218,8 @@ class HPolytope(Rows):
         ------
         UnboundedError
             If the set is unbounded.
+        UndecidedError
+            If the set is too thin for vertices in floats (below 1e-14 of its size).
         """
         return vertices(self)
 
@@ -250,9 +252,10 @@ class HPolytope(Rows):
     def remove_redundancy(self) -> Self:
         """The same set by a minimal description: independent equalities and one row per facet.
 
-        A row is dropped if the others imply it to within 1e-12 of the largest |b|, very far rows aside (outward: the
-        result contains the set).  Implicit equalities become explicit, decided exactly.  One program a row, over the
-        facets only (Clarkson).
+        A row is dropped if the others imply it to within 1e-12 of its slack at the centre of the set (outward: the
+        result contains the set, and is at most 1 + 1e-12 times as large about that centre, whatever the scales of the
+        axes).  Implicit equalities become explicit, decided exactly.  One program a row, over the facets only
+        (Clarkson); a row that rounding leaves open is decided in rationals (milliseconds).
         """
         return type(self)(*minimal_rows(self))
 
@@ -326,8 +329,8 @@ class HPolytope(Rows):
         method : {"auto", "fourier-motzkin", "convex-hull", "vertices"}
             "fourier-motzkin" works for every set and is fastest on sparse rows; "convex-hull" (a bounded shadow) costs
             by the facets of the result; "vertices" (a bounded set) by the vertices of this one.  "auto" eliminates
-            while a step forms at most 1000 rows; then it takes the vertices (at most 6 coordinates, 4 or more kept) or
-            the convex hull, if the set or its shadow is bounded.
+            while a step forms, and the next is foreseen to form, at most 1000 rows; then it takes the vertices (at
+            most 5 coordinates, or 6 and 4 or more kept) or the convex hull, if the set or its shadow is bounded.
         max_rows : int
             Limit on the rows that one step of Fourier-Motzkin may form.
         outer : bool
@@ -339,6 +342,8 @@ class HPolytope(Rows):
             At the limit, without `outer`; the message holds the numbers.
         UnboundedError
             If the method needs a bounded set.
+        UndecidedError
+            If a hull was asked for and the set is too thin for one in floats.
         """
         kept = [int(j) for j in keep]
         if not kept or len(set(kept)) != len(kept) or not all(0 <= j < self.dim for j in kept):

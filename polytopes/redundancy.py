@@ -15,7 +15,7 @@ from polytopes.support import known_nonempty
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_DUAL_FROM = {2: 1000, 3: 4000}  # rows from which Qhull's dual hull proposes, by dimension; programs alone are faster below
+_DUAL_FROM = {2: 1000, 3: 4000}  # rows, by dimension; with fewer, programs alone are faster than Qhull's dual hull
 
 
 def minimal_rows(P: Rows) -> tuple[Floats, Floats, Floats, Floats]:

@@ -17,7 +17,9 @@ from polytopes.projection import METHODS
 Floats = np.ndarray
 
 
-def uneven_set(rng: np.random.Generator, n: int, span: float, width: float | None = None) -> tuple[Floats, Floats, Floats]:
+def uneven_set(
+    rng: np.random.Generator, n: int, span: float, width: float | None = None
+) -> tuple[Floats, Floats, Floats]:
     """Integer rows inside a box, with a slab of the given width, axes scaled by 10^-span to 10^span."""
     m = int(rng.integers(3, 9))
     A = np.vstack([rng.integers(-3, 4, (m, n)), np.eye(n), -np.eye(n)]).astype(float)
