@@ -9,9 +9,9 @@ set in fewer coordinates.  Then
 - "vertices" takes the hull of projected vertices; good only while the vertices can be listed (total dimension <= 6).
 
 "auto" eliminates as long as no step forms more than 1000 rows (some 5 ms) or lets the next one be foreseen to.  Beyond,
-a bounded set of at most 5 coordinates, or 6 with a shadow in 4 or 5, goes by its vertices (each round of the refinement is a hull in so many
-coordinates); any other with a bounded shadow by the hull of support points.  Measured on sets of 4 to 8 coordinates and
-30 to 80 rows, see ``docs/polytopes.md``.
+a bounded set of at most 5 coordinates, or of 6 with a shadow in 4 or 5, goes by its vertices (each round of the
+refinement is a hull in so many coordinates); any other with a bounded shadow by the hull of support points.  Measured
+on sets of 4 to 8 coordinates and 30 to 80 rows, see ``docs/polytopes.md``.
 """
 
 from collections.abc import Sequence

@@ -145,12 +145,12 @@ def _exceeds(AT: Matrix, b: Vector, c: Vector, slack: float, x: Vector, origin: 
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def _one_by_one(AT: Matrix, b: Vector) -> tuple[Index, Index]:
-    """One program per row against all rows still kept, that row relaxed."""
+def _one_by_one(AT: Matrix, b: Vector, asked: Index) -> tuple[Index, Index]:
+    """One program per row that is asked for, against all rows still kept, that row relaxed."""
     d, m = AT.shape
     keep, doubtful = np.ones(m, np.int64), np.zeros(m, np.int64)
     relaxed, x, c, origin = b.copy(), np.empty(d), np.empty(d), np.zeros(d)
-    for i in range(m):
+    for i in np.flatnonzero(asked):
         relaxed[i] = b[i] + 1.0
         for j in range(d):
             c[j] = AT[j, i]
@@ -339,12 +339,13 @@ def irredundant(AT: Matrix, b: Vector, x0: Vector) -> tuple[Index, Index]:
     rows, rhs, inside = centred(AT[:, chosen], b[chosen], x0)
     if not inside:
         return chosen, np.ones(chosen.size, np.int64)
+    asked = np.ones(chosen.size, np.int64)
     if chosen.size >= _CLARKSON_FROM:
         keep, doubtful = _clarkson(rows, rhs)
         kept = np.flatnonzero(keep)
         if not doubtful.any():
             return chosen[kept], doubtful[kept]
-        chosen, rows, rhs = chosen[kept], np.ascontiguousarray(rows[:, kept]), rhs[kept]
-    keep, doubtful = _one_by_one(rows, rhs)
+        chosen, rows, rhs, asked = chosen[kept], np.ascontiguousarray(rows[:, kept]), rhs[kept], doubtful[kept]
+    keep, doubtful = _one_by_one(rows, rhs, asked)
     kept = np.flatnonzero(keep)
     return chosen[kept], doubtful[kept]
