@@ -41,10 +41,10 @@ _NAMES = {kernel.OPTIMAL: OPTIMAL, kernel.UNBOUNDED: UNBOUNDED}
 def warm_up() -> None:
     """Compile the kernels, or load them from the cache, so that no later call has to.
 
-    The first time on a machine takes some 20 s, and one line on the logger ``polytopes`` says so; afterwards it
+    The first time on a machine takes some 30 s, and one line on the logger ``polytopes`` says so; afterwards it
     takes a fraction of a second.  Called on first use; call it yourself before a loop that must not be delayed.
     """
-    line = "compiling the LP kernels: once on this machine, about 20 s"
+    line = "compiling the LP kernels: once on this machine, about 30 s"
     announce = threading.Timer(_ANNOUNCE_AFTER, logging.getLogger("polytopes").warning, [line])
     announce.daemon = True
     announce.start()
