@@ -43,5 +43,5 @@ $(VENV)/.study: pyproject.toml | $(BIN)/python
 
 $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing what the tests need into $(VENV) (about a minute)"
-	$(PIP) '.[study,compare,dev]'
+	$(PIP) '.[study,cluster,compare,dev]'
 	@touch $@ $(VENV)/.study
