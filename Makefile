@@ -6,7 +6,7 @@ OUT    ?= demo
 STUDY  := $(OUT)/eclipse
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
 
-.PHONY: demo test test-slow bench lint clean
+.PHONY: demo test test-slow bench docs lint clean
 
 # The isolation-time study of the Eclipse with both noise sets, then a check of every alarm's proof.
 demo: $(VENV)/.study
@@ -24,12 +24,17 @@ test-slow: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks
 
+# The documentation site, offline; a broken link or reference is an error.
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "Open docs/_build/html/index.html in a browser."
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) $(STUDY) build *.egg-info
+	rm -rf $(VENV) $(STUDY) docs/_build docs/_copied build *.egg-info
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -43,5 +48,10 @@ $(VENV)/.study: pyproject.toml | $(BIN)/python
 
 $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing what the tests need into $(VENV) (about a minute)"
-	$(PIP) '.[study,compare,dev]'
+	$(PIP) '.[study,cluster,compare,dev]'
 	@touch $@ $(VENV)/.study
+
+$(VENV)/.docs: pyproject.toml | $(BIN)/python
+	@echo "Installing what the documentation needs into $(VENV) (about a minute)"
+	$(PIP) '.[study,docs]'
+	@touch $@

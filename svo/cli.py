@@ -75,6 +75,10 @@ def study(
             metavar="NAME", help="Fault, or none for fault-free runs; may be repeated. [default: all and none]"
         ),
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Run on the dask.distributed cluster of this scheduler instead."),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
     ] = False,
@@ -105,7 +109,9 @@ def study(
         _announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
         with progress("Runs") as update:
-            folder = run_study(configuration, out, workers=workers, resume=resume, progress=update)
+            folder = run_study(
+                configuration, out, workers=workers, scheduler=scheduler, resume=resume, progress=update
+            )
         _announce("Writing summary, pictures and report")
         summaries = publish(folder, the_plant)
         if as_json:

@@ -39,6 +39,7 @@ def write_report(
     identity: Mapping[str, Any],
     summaries: Sequence[ConditionSummary],
     pictures: Iterable[Picture],
+    interactive: str,
 ) -> None:
     """Write the report of a study.
 
@@ -52,6 +53,8 @@ def write_report(
     summaries : sequence of ConditionSummary
     pictures : iterable of Picture
         Embedded into the page.
+    interactive : str
+        HTML of the views that a reader can move in (`svo.study.interactive`).
     """
     configuration = identity["configuration"]
     parts = [
@@ -63,6 +66,7 @@ def write_report(
         f'<p class="soft">Paper: {escape(plant.reference_title)}; a dash where it says nothing.</p>'
         if plant.reference
         else "",
+        interactive,
         "<h2>Pictures</h2>",
         *(_figure(picture) for picture in pictures),
         "<h2>What is counted</h2>",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from svo.alarms import Alarm
 from svo.detect import alarms_of
 from svo.isolation.record import BankRecord
 from svo.log import Log
-from svo.plant import HEALTHY, Plant
+from svo.plant import HEALTHY, Plant, load_plant
 from svo.study.configuration import Job
 from svo.study.exemplar import Exemplar, follow
 
@@ -68,6 +69,21 @@ class RunOutcome:
     row: RunRow
     alarms: tuple[Alarm, ...]
     exemplar: Exemplar | None
+
+
+@cache
+def registered_plant(name: str) -> Plant:
+    """A plant by its name; loaded once a process, since its tables may take a while."""
+    return load_plant(name)
+
+
+def run_registered(plant: str, job: Job) -> RunOutcome:
+    """One run of a registered plant, in whatever process; RuntimeError that names the run if it fails."""
+    try:
+        return execute(registered_plant(plant), job)
+    except Exception as error:
+        where = f"fault {job.fault}, profile {job.profile}, noise {job.noise}, seed {job.seed}"
+        raise RuntimeError(f"run {job.run} ({where}) failed: {type(error).__name__}: {error}") from error
 
 
 def execute(plant: Plant, job: Job) -> RunOutcome:

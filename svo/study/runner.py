@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import multiprocessing
 import os
 import signal
@@ -14,9 +13,10 @@ from pathlib import Path
 from time import perf_counter
 
 import polytopes
-from svo.plant import HEALTHY, Plant, load_plant
+from svo.plant import HEALTHY, Plant
+from svo.study.cluster import on_cluster
 from svo.study.configuration import Job, StudyConfiguration
-from svo.study.run import execute
+from svo.study.run import registered_plant, run_registered
 from svo.study.store import StudyFolder
 
 Progress = Callable[[int, int], None]
@@ -27,6 +27,7 @@ def run_study(
     out: str | Path,
     *,
     workers: int = 1,
+    scheduler: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
 ) -> StudyFolder:
@@ -42,6 +43,8 @@ def run_study(
         A folder that is new or empty, or holds this very study if ``resume``.
     workers : int
         Number of processes; 1 runs in this one.
+    scheduler : str, optional
+        Address of a ``dask.distributed`` scheduler: its workers run the study instead (see `svo.study.cluster`).
     resume : bool
         Go on with the study in ``out``.
     progress : callable, optional
@@ -55,20 +58,20 @@ def run_study(
     Raises
     ------
     ValueError
-        If the folder cannot be used (see `StudyFolder.open`) or ``workers`` is below 1.
+        If the folder cannot be used (see `StudyFolder.open`), ``workers`` is below 1, or no cluster answers.
     RuntimeError
-        If a run fails or a worker dies; the runs that are done are kept.
+        If a run fails or a worker process of this machine dies; the runs that are done are kept.
     """
     if workers < 1:
         raise ValueError(f"workers is {workers}; expected at least 1 process")
     folder = StudyFolder(Path(out))
-    jobs = configuration.jobs(_plant(configuration.plant))
+    jobs = configuration.jobs(registered_plant(configuration.plant))
     done = folder.open(configuration, resume)
     to_do = [job for job in jobs if job.run not in done]
     if progress is not None:
         progress(len(jobs) - len(to_do), len(jobs))
-    finished = _in_processes if workers > 1 and len(to_do) > 1 else _here
-    for count, _ in enumerate(finished(configuration, folder, to_do, workers), start=len(jobs) - len(to_do) + 1):
+    finished = _finished(configuration, folder, to_do, workers, scheduler)
+    for count, _ in enumerate(finished, start=len(jobs) - len(to_do) + 1):
         if progress is not None:
             progress(count, len(jobs))
     folder.join_alarms()
@@ -84,7 +87,18 @@ def warm_up(plant: Plant, noise: str) -> float:
     return perf_counter() - begun
 
 
-def _here(configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job], workers: int) -> Iterator[int]:
+def _finished(
+    configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job], workers: int, scheduler: str | None
+) -> Iterator[int]:
+    """Numbers of the jobs as they are done and stored, wherever they run."""
+    if scheduler is not None and jobs:
+        return on_cluster(configuration, folder, jobs, scheduler)
+    if workers > 1 and len(jobs) > 1:
+        return _in_processes(configuration, folder, jobs, workers)
+    return _here(configuration, folder, jobs)
+
+
+def _here(configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job]) -> Iterator[int]:
     for job in jobs:
         yield _run(configuration, folder, job)
 
@@ -131,16 +145,6 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-@functools.cache
-def _plant(name: str) -> Plant:
-    """A plant is loaded once a process: its tables may take a while."""
-    return load_plant(name)
-
-
 def _run(configuration: StudyConfiguration, folder: StudyFolder, job: Job) -> int:
-    try:
-        folder.write(execute(_plant(configuration.plant), job), configuration)
-    except Exception as error:
-        where = f"fault {job.fault}, profile {job.profile}, noise {job.noise}, seed {job.seed}"
-        raise RuntimeError(f"run {job.run} ({where}) failed: {type(error).__name__}: {error}") from error
+    folder.write(run_registered(configuration.plant, job), configuration)
     return job.run

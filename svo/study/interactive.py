@@ -1,0 +1,109 @@
+"""What the report's script draws: every run as a dot, and one run of each kind sample by sample, as compact JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from svo.plant import HEALTHY, Plant
+from svo.study.exemplar import Exemplar
+from svo.study.plots import colours, separating_states, time_window
+from svo.study.run import RunRow
+
+_FRAMES = 160  # samples of a run that the page holds; more would only make it heavier
+_DIGITS = 6
+
+
+def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterable[Exemplar]) -> str:
+    """HTML of both views with their data and script; nothing is loaded from elsewhere.
+
+    Parameters
+    ----------
+    plant : Plant
+        For its name, units and the time of the fault.
+    rows : sequence of RunRow
+    exemplars : iterable of Exemplar
+        Those of fault-free runs are left out: nothing happens in them.
+    """
+    flights = [_flight(plant, e) for e in exemplars if e.fault != HEALTHY]
+    data = {"plant": plant.name, "Ts": plant.Ts, "runs": [_run(row) for row in rows], "flights": flights}
+    # "<" cannot end the script element from inside a string.
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    script = files("svo.study").joinpath("report.js").read_text(encoding="utf-8")
+    options = "".join(f'<option value="{i}">{escape(flight["title"])}</option>' for i, flight in enumerate(flights))
+    return _SECTION.format(options=options, data=text, script=script)
+
+
+_SECTION = """<h2>Every run</h2>
+<p class="soft">One dot a run, left detection, right isolation. Point at a dot, touch it or move with the arrow keys:
+its seed makes that very run.</p>
+<div class="scroll"><svg id="runs" role="img" aria-label="Delays of every run"></svg></div>
+<p id="run" class="readout" aria-live="polite">&nbsp;</p>
+<h2>One run, step by step</h2>
+<p class="soft">Bounds of two states by each model alive, around the true state (cross). A model whose set becomes empty
+is falsified and disappears.</p>
+<p class="controls">
+<label>Run <select id="flight">{options}</select></label>
+<button id="play" type="button">Play</button>
+<label class="grow">Time <input id="time" type="range" min="0" value="0" step="1"></label>
+</p>
+<div class="scroll"><svg id="sets" role="img" aria-label="Bounds of two states by each model"></svg></div>
+<p id="sample" class="readout" aria-live="off">&nbsp;</p>
+<script id="data" type="application/json">{data}</script>
+<script>
+{script}</script>"""
+
+
+def _run(row: RunRow) -> dict[str, Any]:
+    return {
+        "run": row.run,
+        "seed": row.seed,
+        "fault": row.fault,
+        "profile": row.profile,
+        "noise": row.noise,
+        "detect": row.detection_delay_s,
+        "isolate": row.isolation_delay_s,
+        "as": row.isolated_as,
+        "false": row.false_alarm,
+    }
+
+
+def _flight(plant: Plant, exemplar: Exemplar) -> dict[str, Any]:
+    """Boxes of the two states that tell the models apart, around the fault and the falsifications."""
+    begin, end = time_window(exemplar, plant.fault_time, plant.Ts)
+    after = exemplar.time - plant.fault_time
+    inside = np.flatnonzero((after >= begin) & (after <= end))
+    fallen = [k for i in range(len(exemplar.names)) if (k := exemplar.died_at(i)) is not None]
+    events = np.intersect1d(inside, np.concatenate([fallen, np.array(fallen, dtype=int) - 1]))
+    kept = np.union1d(inside[:: -(-inside.size // _FRAMES)], events)  # never without the samples that matter
+    states = list(separating_states(exemplar))
+    tone = colours(exemplar.names)
+    columns = [plant.columns.states[i] for i in states]
+    models = [
+        {
+            "name": name,
+            "colour": tone[name],
+            "lower": _numbers(exemplar.lower[kept, i][:, states]),
+            "upper": _numbers(exemplar.upper[kept, i][:, states]),
+        }
+        for i, name in enumerate(exemplar.names)
+    ]
+    return {
+        "title": f"{exemplar.fault}, {exemplar.profile}, {exemplar.noise} noise",
+        "axes": [f"{column.name} [{column.unit}]" for column in columns],
+        "time": _numbers(after[kept]),
+        "true": _numbers(exemplar.x[kept][:, states]),
+        "models": models,
+    }
+
+
+def _numbers(values: np.ndarray) -> list[Any]:
+    """Nested lists of floats with few digits; None for NaN."""
+    if values.ndim > 1:
+        return [_numbers(row) for row in values]
+    return [None if np.isnan(v) else float(f"{v:.{_DIGITS}g}") for v in values.tolist()]

@@ -1,0 +1,79 @@
+"""A study on a real local cluster of worker processes: the same rows, and a worker that is killed costs only time."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from svo.plant import load_plant
+from svo.study.configuration import StudyConfiguration
+from svo.study.run import RunRow
+from svo.study.runner import run_study
+
+distributed = pytest.importorskip("distributed", reason="needs the extra 'cluster'")
+
+
+@pytest.fixture
+def cluster(registered_tank: str) -> Iterator[distributed.LocalCluster]:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0
+    ) as cluster:
+        yield cluster
+
+
+def untimed(rows: list[RunRow]) -> list[RunRow]:
+    return [replace(row, microseconds_per_step=0.0, microseconds_p99=0.0) for row in rows]
+
+
+def test_a_worker_killed_in_mid_study_costs_nothing_but_time(
+    cluster: distributed.LocalCluster, registered_tank: str, tmp_path: Path
+) -> None:
+    wanted = StudyConfiguration.for_plant(load_plant(registered_tank), runs=5, seed=3)
+    killed: list[int] = []
+
+    def kill_one(done: int, of: int) -> None:
+        if done == 3 and not killed:
+            with distributed.Client(cluster, set_as_default=False) as client:
+                killed.append(next(iter(client.run(os.getpid).values())))
+            os.kill(killed[0], signal.SIGKILL)
+
+    spread = run_study(wanted, tmp_path / "cluster", scheduler=cluster.scheduler_address, progress=kill_one)
+    here = run_study(wanted, tmp_path / "here")
+    assert killed
+    assert untimed(spread.rows()) == untimed(here.rows())
+    assert spread.alarms.read_bytes() == here.alarms.read_bytes()
+
+
+def test_a_run_that_fails_on_the_cluster_is_named(
+    registered_tank: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("TANK_BURSTS", "1")
+    wanted = StudyConfiguration.for_plant(load_plant(registered_tank), runs=2, seed=3, faults=("gauge",))
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
+        pytest.raises(RuntimeError, match=r"run \d \(fault gauge, .*\) failed: .*burst"),
+    ):
+        run_study(wanted, tmp_path, scheduler=cluster.scheduler_address)
+
+
+def test_an_address_without_a_scheduler_is_one_clear_error(
+    registered_tank: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("svo.study.cluster._CONNECT", "0.5s")
+    wanted = StudyConfiguration.for_plant(load_plant(registered_tank), runs=1, seed=3)
+    with pytest.raises(ValueError, match=r"no dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
+        run_study(wanted, tmp_path, scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_cluster_without_workers_is_one_clear_error(registered_tank: str, tmp_path: Path) -> None:
+    wanted = StudyConfiguration.for_plant(load_plant(registered_tank), runs=1, seed=3)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster,
+        pytest.raises(ValueError, match="has no workers"),
+    ):
+        run_study(wanted, tmp_path, scheduler=cluster.scheduler_address)
