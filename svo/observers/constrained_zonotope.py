@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
+TINY = float(np.finfo(np.float64).tiny)  # covers what underflow takes from a sum
+_PIVOT = 1e-12  # of a constraint's terms: smaller coefficients imply nothing of use about their xi
 
 
 def unit(terms: int) -> float:
@@ -68,7 +70,7 @@ class ConstrainedZonotope:
         """
         size = np.abs(M)
         reach = np.abs(self.center) + np.abs(self.generators).sum(axis=1)
-        rounding = unit(self.dim + self.generators.shape[1]) * (size @ (reach + self.room) + np.abs(t))
+        rounding = unit(self.dim + self.generators.shape[1]) * (size @ (reach + self.room) + np.abs(t)) + TINY
         return replace(
             self,
             center=M @ self.center + t,
@@ -89,7 +91,7 @@ class ConstrainedZonotope:
         reach = np.abs(self.center) + np.abs(self.generators).sum(axis=1) + self.room
         known, terms = rows @ self.center, size @ reach
         spread = np.abs(rows @ self.generators).sum(axis=1) + size @ self.room
-        rounding = unit(self.dim + self.generators.shape[1]) * terms
+        rounding = unit(self.dim + self.generators.shape[1]) * terms + TINY
         room = spread + 2.0 * rounding
         low = np.where(np.isfinite(lower), lower - known, -room)
         high = np.where(np.isfinite(upper), upper - known, room)
@@ -132,7 +134,8 @@ class ConstrainedZonotope:
         """
         lower, upper = -np.ones(self.generators.shape[1]), np.ones(self.generators.shape[1])
         A = self.constraints
-        used = np.abs(A) > 0.0
+        terms = np.abs(self.offset) + self.slack + np.abs(A).sum(axis=1)
+        used = np.abs(A) > _PIVOT * terms[:, None]
         if not used.any():
             return lower, upper
         inverse = np.divide(1.0, A, out=np.zeros_like(A), where=used)
@@ -140,7 +143,6 @@ class ConstrainedZonotope:
             center, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
             size = np.abs(A) * half
             total = size.sum(axis=1)
-            terms = np.abs(self.offset) + self.slack + np.abs(A).sum(axis=1)
             others = self.slack[:, None] + (total[:, None] - size) + (unit(A.shape[1]) * terms)[:, None]
             middle = (self.offset - A @ center)[:, None] * inverse + center
             reach = others * np.abs(inverse)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq, qr
 
-from svo.observers.constrained_zonotope import EPS, ConstrainedZonotope, unit
+from svo.observers.constrained_zonotope import EPS, TINY, ConstrainedZonotope, unit
 
 Array = NDArray[np.float64]
 _RANK = 1e-9  # of the scaled generators, below which a direction counts as flat
@@ -45,10 +45,10 @@ def rescaled(Z: ConstrainedZonotope) -> ConstrainedZonotope:
     return ConstrainedZonotope(
         center=Z.center + Z.generators @ center,
         generators=Z.generators * half,
-        room=Z.room + rounding * (sums[0] + np.abs(Z.center)),
+        room=Z.room + rounding * (sums[0] + np.abs(Z.center)) + TINY,
         constraints=Z.constraints * half,
         offset=Z.offset - Z.constraints @ center,
-        slack=Z.slack + rounding * (sums[1] + np.abs(Z.offset)),
+        slack=Z.slack + rounding * (sums[1] + np.abs(Z.offset)) + TINY,
     )
 
 
@@ -87,10 +87,10 @@ def _without_one_constraint(Z: ConstrainedZonotope) -> ConstrainedZonotope:
         ConstrainedZonotope(
             center=Z.center + g * base,
             generators=generators,
-            room=Z.room + rounding * (widths + np.abs(Z.center) + np.abs(g) * spread),
+            room=Z.room + rounding * (widths + np.abs(Z.center) + np.abs(g) * spread) + TINY,
             constraints=constraints,
             offset=Z.offset - a * base,
-            slack=Z.slack + rounding * (total + np.abs(Z.offset) + np.abs(a) * spread),
+            slack=Z.slack + rounding * (total + np.abs(Z.offset) + np.abs(a) * spread) + TINY,
         ),
         kept,
     )
@@ -136,6 +136,6 @@ def _absorbed(Z: ConstrainedZonotope, base: Array, kept: Array, gone: Array, rho
         wide = matrix[:, base] * scale
         left = np.abs(matrix[:, gone] - matrix[:, base] @ rho).sum(axis=1)
         terms = np.abs(matrix[:, gone]).sum(axis=1) + 2.0 * np.abs(wide).sum(axis=1)
-        results.append((np.hstack([wide, matrix[:, kept]]), left * (1.0 + rounding) + rounding * terms))
+        results.append((np.hstack([wide, matrix[:, kept]]), left * (1.0 + rounding) + rounding * terms + TINY))
     (generators, room), (constraints, slack) = results
     return replace(Z, generators=generators, room=Z.room + room, constraints=constraints, slack=Z.slack + slack)

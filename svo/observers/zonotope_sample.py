@@ -1,7 +1,7 @@
 """One sample of the constrained-zonotope observer: what w, the channels and a measurement add to the set of the state.
 
-An uncertainty enters as p = Delta s over the bounds [l, r] of s: the two lines of `WindowObserver`, as constraints over a
-generator of p. The same w and p enter the next state and the output.
+An uncertainty enters as p = Delta s over the bounds [l, r] of s: the two lines of `WindowObserver`, as constraints over
+a generator of p. The same w and p enter the next state and the output.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from svo.observers.constrained_zonotope import EPS, ConstrainedZonotope, unit
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
 from svo.observers.window_kernel import channel_factors
 from svo.observers.window_setup import channel_owners, finite_box, joint_rows, output_is_disturbed
+from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate, proven_support, rounded_up
 
 Array = NDArray[np.float64]
@@ -114,7 +115,13 @@ class StageBuilder:
         f, known = stage.functionals[:, self._columns()], self._known(stage.functionals, u)
         terms = self._known(np.abs(stage.functionals), np.abs(u))
         low, high = joint.range_of(f, known)
-        rounding = unit(len(u)) * terms
+        is_unsure = (low < 0.0) & (high > 0.0) & f.any(axis=1)
+        if is_unsure.any():
+            ends = ZonotopeProgram(joint).support(np.vstack([f[is_unsure], -f[is_unsure]]))
+            half = len(ends) // 2
+            low[is_unsure] = np.maximum(low[is_unsure], known[is_unsure] - ends[half:])
+            high[is_unsure] = np.minimum(high[is_unsure], known[is_unsure] + ends[:half])
+        rounding = unit(len(u)) * (terms + np.abs(low) + np.abs(high))
         low, high = low - rounding, high + rounding
         lines = np.array([_lines(*ends) for ends in zip(self._delta, low, high, strict=True)]).reshape(-1, 4)
         on_p = []
@@ -134,10 +141,11 @@ class StageBuilder:
         n = self.model.n_states
         M = np.hstack([stage.data.stack[0, :n][:, self._columns()], stage.gains[:, :n].T])
         known = self._known(stage.data.stack[0, :n], u)
-        return stage, stage.joint.affine_map(M, known).grown(unit(len(u)) * self._known(np.abs(stage.data.stack[0, :n]), np.abs(u)))
+        size = self._known(np.abs(stage.data.stack[0, :n]), np.abs(u))
+        return stage, stage.joint.affine_map(M, known).grown(unit(len(u)) * size)
 
     def certificate(self, stages: tuple[Stage, ...], multipliers: Array, last: int) -> ZonotopeCertificate | None:
-        """The certificate that multipliers of the constraints of the last stage amount to; None if it proves nothing."""
+        """The certificate that multipliers of the last stage's constraints amount to; None if it proves nothing."""
         n, arrival = self.model.n_states, stages[0].arrival
         multipliers = multipliers / max(float(np.abs(multipliers).max(initial=0.0)), np.finfo(float).tiny)
         costate, samples = np.zeros(n), []
