@@ -3,8 +3,8 @@
 Run with ``python -m benchmarks.soundness --observer window --samples 1000000``. Plants have 1 to 6 states, up to two
 uncertainties in any of A, B, a, E and C, D, c, F, disturbances shared by state and output, polytopes of w, zero widths
 and missing sensors; half of the runs keep w, noise and Delta at the corners of their bounds. Every verdict counts; the
-true state is compared with the box at one sample in five. Plant i is drawn from seed (SEED, i), so that a run can go on where another ended
-(``--first``).
+true state is compared with the box at one sample in five. Plant i is drawn from seed (SEED, i), so that a run can go on
+where another ended (``--first``).
 """
 
 from __future__ import annotations
@@ -100,13 +100,14 @@ def main(given: list[str] | None = None) -> None:
             for count in track(found, name, total=len(plants), console=console, transient=True):
                 total += count
         notes += [note for note in total if ": plant" in note or note.startswith("stopped")]
+        milliseconds = total["milliseconds"] / max(total["samples"], 1)
         rows.append([
             name, total["plants"], total["uncertain"], total["shared"], total["samples"], total["boxes"],
-            total["exclusions"], total["falsified"], total["undecided"], f"{total['milliseconds'] / max(total['samples'], 1):.2f}",
+            total["exclusions"], total["falsified"], total["undecided"], f"{milliseconds:.2f}",
             f"{perf_counter() - begun:.0f}",
         ])  # fmt: skip
-    columns = ("observer", "plants", "uncertain", "with F", "samples", "boxes", "exclusions", "false alarms", "undecided",
-               "CPU ms a sample", "seconds")  # fmt: skip
+    columns = ("observer", "plants", "uncertain", "with F", "samples", "boxes", "exclusions", "false alarms",
+               "undecided", "CPU ms a sample", "seconds")  # fmt: skip
     table(f"Random plants, seed {SEED}: exclusions and false alarms must be zero", columns, rows)
     for note in notes:
         console.print(note)

@@ -1,4 +1,4 @@
-"""Linear programs over a constrained zonotope: a point, multipliers that say there is none, outer bounds of supports."""
+"""Linear programs over a constrained zonotope: a point or multipliers that say there is none, supports."""
 
 from __future__ import annotations
 
