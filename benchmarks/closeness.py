@@ -1,4 +1,4 @@
-"""How close each observer comes to the limit: full information gives the earliest sample at which a fault can be proven.
+"""How close each observer comes to the limit: full information says when a fault can be proven first.
 
 Run with ``python -m benchmarks.closeness --runs 200``. Linear plants of 2 to 6 states with a bias or a slow drift of a
 sensor from sample 15 on. The limit is the window observer with all data since the start, whose program the tests

@@ -5,8 +5,8 @@ Run with ``python -m benchmarks.growth``. CPU time of a step, boxes not read, al
 horizon          a random linear plant of 4 states: the window observer, the paper's method (`PolytopeObserver`, 60
                  facets), and one emptiness program a sample over the same window by HiGHS, rebuilt. (HiGHS warm and
                  cvxpy on the same programs: ``python -m benchmarks.window_observer``.)
-uncertainties    q of rank one in the state equation: window, zonotope and polytope observer; a hull over the vertices of
-                 Delta in all steps would need 2^(q N) images
+uncertainties    q of rank one in the state equation: window, zonotope and polytope observer; a hull over the vertices
+                 of Delta in all steps would need 2^(q N) images
 memory           resident memory of a window observer over a long log (``--samples``)
 
 What a number of states costs is in ``python -m benchmarks.set_representations``.

@@ -102,7 +102,8 @@ def main(given: list[str] | None = None) -> None:
                 costs, values = [p[3] for p in mine], [p[column] for p in mine]
                 ax.plot(costs, values, label=f"{s}, {t}", marker=MARKERS[t], linestyle=line)
                 for p in mine:
-                    ax.annotate(str(p[2] or ""), (p[3], p[column]), textcoords="offset points", xytext=(4, 4), fontsize=8)
+                    at = p[3], p[column]
+                    ax.annotate(str(p[2] or ""), at, textcoords="offset points", xytext=(4, 4), fontsize=8)
     axes[0].set_ylabel("mean time to detect a soft fault of alpha [s]")
     axes[1].set_ylabel("mean width of the box, relative to the least")
     for ax in axes:

@@ -1,4 +1,4 @@
-"""Checks of what a user hands to an observer at a sample."""
+"""What a user hands to an observer: checks of a sample's data, and the samples of a log."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.log import Log
 from svo.model import UncertainModel
 
 Array = NDArray[np.float64]
@@ -44,3 +45,26 @@ def stack_at(model: UncertainModel, schedule: Any) -> Array:
     if not np.isfinite(stack).all():
         raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected numbers")
     return stack
+
+
+def directions_of(directions: ArrayLike, n: int) -> Array:
+    """Directions (k, n) of a support."""
+    rows = np.asarray(directions, dtype=float)
+    if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
+        raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {n})")
+    return rows
+
+
+def steps_of(observer: Any, log: Log, needs_next_input: bool) -> list[Any]:
+    """The answers of an observer that has not started, at every sample of a log."""
+    if len(log) == 0:
+        raise ValueError("log has no samples; expected at least one")
+    steps = []
+    for k in range(len(log)):
+        following = log.u[k] if needs_next_input else None
+        schedule = log.schedule_at(k)
+        if k == 0:
+            steps.append(observer.update(log.y[k], following, schedule))
+        else:
+            steps.append(observer.step(log.u[k - 1], log.y[k], following, schedule))
+    return steps

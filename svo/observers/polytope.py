@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope, warm_up
 from svo.log import Log
 from svo.model import UncertainModel
-from svo.observers.data import inputs_of, outputs_of, stack_at
+from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.polytope_sets import Outcome, PublishedRecursion, Recursion, Sample, SoundRecursion
 from svo.observers.polytope_state import read_outcome, read_sample, read_set, write_outcome, write_sample, write_set
 from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
@@ -207,17 +207,7 @@ class PolytopeObserver:
 
     def run(self, log: Log) -> PolytopeRecord:
         """All samples of a log, with the box of the state at each."""
-        if len(log) == 0:
-            raise ValueError("log has no samples; expected at least one")
-        steps = []
-        for k in range(len(log)):
-            following = log.u[k] if self.model.uses_input_in_output else None
-            schedule = log.schedule_at(k)
-            steps.append(
-                self.update(log.y[k], following, schedule)
-                if k == 0
-                else self.step(log.u[k - 1], log.y[k], following, schedule)
-            )
+        steps = steps_of(self, log, self.model.uses_input_in_output)
         boxes = np.array([step.box for step in steps])
         return PolytopeRecord(
             verdicts=tuple(step.verdict for step in steps),

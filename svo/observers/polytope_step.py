@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import Certificate, HPolytope
+from svo.observers.data import directions_of
 from svo.observers.step import VerdictName
 from svo.observers.vertex_images import outer_support
 
@@ -109,9 +110,7 @@ class PolytopeStep:
         (k,) array
             -inf once the model is falsified.
         """
-        rows = np.asarray(directions, dtype=float)
-        if rows.ndim != 2 or rows.shape[1] != self.n or not np.isfinite(rows).all():
-            raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {self.n})")
+        rows = directions_of(directions, self.n)
         if self.verdict == "falsified":
             return np.full(len(rows), -np.inf)
         return outer_support(self.joint, np.hstack([rows, np.zeros((len(rows), self.joint.dim - self.n))]))

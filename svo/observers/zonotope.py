@@ -14,7 +14,7 @@ from polytopes import HPolytope
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.constrained_zonotope import ConstrainedZonotope
-from svo.observers.data import inputs_of, outputs_of, stack_at
+from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.proof import WindowSample
 from svo.observers.step import VerdictName
 from svo.observers.zonotope_program import ZonotopeProgram
@@ -153,17 +153,7 @@ class ConstrainedZonotopeObserver:
 
     def run(self, log: Log) -> ZonotopeRecord:
         """All samples of a log, with the box of the state at each."""
-        if len(log) == 0:
-            raise ValueError("log has no samples; expected at least one")
-        steps = []
-        for k in range(len(log)):
-            following = log.u[k] if self._wants_next_input else None
-            schedule = log.schedule_at(k)
-            steps.append(
-                self.update(log.y[k], following, schedule)
-                if k == 0
-                else self.step(log.u[k - 1], log.y[k], following, schedule)
-            )
+        steps = steps_of(self, log, self._wants_next_input)
         boxes = np.array([step.box for step in steps])
         return ZonotopeRecord(
             verdicts=tuple(step.verdict for step in steps),

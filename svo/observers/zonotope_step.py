@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from svo.observers.constrained_zonotope import ConstrainedZonotope
+from svo.observers.data import directions_of
 from svo.observers.step import VerdictName
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate
@@ -71,9 +72,7 @@ class ZonotopeStep:
         (k,) array
             -inf once the model is falsified.
         """
-        rows = np.asarray(directions, dtype=float)
-        if rows.ndim != 2 or rows.shape[1] != self.n or not np.isfinite(rows).all():
-            raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {self.n})")
+        rows = directions_of(directions, self.n)
         if self.verdict == "falsified":
             return np.full(len(rows), -np.inf)
         wide = np.hstack([rows, np.zeros((len(rows), self.joint.dim - self.n))])
