@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from time import process_time
 from typing import Any
 
@@ -91,6 +92,19 @@ def compare(runs: int) -> tuple[dict[str, Tally], int]:
     return tallies, provable
 
 
+def draw(shares: dict[str, float], folder: Path) -> None:
+    """Shares of runs at the earliest sample, by observer."""
+    figure, ax = plt.subplots(figsize=(7, 4))
+    names = list(shares)
+    ax.barh(names, [shares[name] for name in names])
+    ax.axvline(95, color="black", linestyle="--", label="aim for the default, 95 %")
+    ax.set_xlabel("runs with the alarm at the earliest provable sample [%]")
+    ax.set_xlim(0, 100)
+    ax.invert_yaxis()
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    save(figure, folder, "closeness.png")
+
+
 def main(given: list[str] | None = None) -> None:
     """Compare, print and draw."""
     parser = arguments("closeness", __doc__)
@@ -112,15 +126,7 @@ def main(given: list[str] | None = None) -> None:
     columns = ("observer", "runs", "same sample, %", "mean delay beyond, samples", "missed", "earlier (must be 0)",
                "exact check, ms, median / largest", "undecided")  # fmt: skip
     table(f"{provable} of {options.runs} runs with a fault that can be proven, seed {SEED}", columns, rows)
-    figure, ax = plt.subplots(figsize=(7, 4))
-    names = list(shares)
-    ax.barh(names, [shares[name] for name in names])
-    ax.axvline(95, color="black", linestyle="--", label="aim for the default, 95 %")
-    ax.set_xlabel("runs with the alarm at the earliest provable sample [%]")
-    ax.set_xlim(0, 100)
-    ax.invert_yaxis()
-    ax.legend(loc="lower left")
-    save(figure, options.out, "closeness.png")
+    draw(shares, options.out)
 
 
 if __name__ == "__main__":

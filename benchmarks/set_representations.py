@@ -100,7 +100,7 @@ def main(given: list[str] | None = None) -> None:
         ax.set_ylabel(label)
         if column != 1:
             ax.set_yscale("log")
-    axes[0].legend(fontsize=8)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="lower center", ncols=4, bbox_to_anchor=(0.5, 0.9))
     save(figure, options.out, "set_representations.png")
 
 
