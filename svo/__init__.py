@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from svo.model import UncertainModel
     from svo.observers.polytope import PolytopeObserver
     from svo.observers.window import WindowObserver
+    from svo.observers.zonotope import ConstrainedZonotopeObserver
     from svo.uncertainty import Uncertainty
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "ArchitectureII",
     "BankRecord",
     "Calibration",
+    "ConstrainedZonotopeObserver",
     "Distinguishability",
     "Log",
     "PolytopeObserver",
@@ -39,6 +41,7 @@ _HOMES = {
     "ArchitectureII": "svo.isolation.architectures",
     "BankRecord": "svo.isolation.record",
     "Calibration": "svo.calibration",
+    "ConstrainedZonotopeObserver": "svo.observers.zonotope",
     "Distinguishability": "svo.distinguish",
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",

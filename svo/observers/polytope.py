@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
@@ -12,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope, warm_up
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.polytope_sets import Outcome, PublishedRecursion, Recursion, Sample, SoundRecursion
+from svo.observers.polytope_state import read_outcome, read_sample, read_set, write_outcome, write_sample, write_set
 from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
 from svo.observers.vertex_images import transitions
 
@@ -89,6 +92,8 @@ class PolytopeObserver:
             )
         self.model = model
         self.horizon = int(horizon)
+        self.max_facets = max_facets
+        self.eps = float(eps)
         self._recursion: Recursion
         if as_published:
             _check_published(model, coupled, self.horizon)
@@ -125,7 +130,7 @@ class PolytopeObserver:
         begun = perf_counter()
         if self._last is not None:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        sample = self._sample(0, y0, self._inputs("u", u, self.model.uses_input_in_output), schedule)
+        sample = self._sample(0, y0, inputs_of(self.model, "u", u, self.model.uses_input_in_output), schedule)
         return self._keep(sample, self._recursion.first(self._initial, sample), begun)
 
     def step(
@@ -153,8 +158,8 @@ class PolytopeObserver:
             If a set is too thin for any linear program to settle. The observer is unchanged.
         """
         begun = perf_counter()
-        inputs = self._inputs("u", u, True)
-        following = self._inputs("u_next", u_next, self.model.uses_input_in_output)
+        inputs = inputs_of(self.model, "u", u, True)
+        following = inputs_of(self.model, "u_next", u_next, self.model.uses_input_in_output)
         if self._last is None:
             sample = self._sample(1, y, following, schedule)
             start = self._sample(0, np.full(self.model.n_outputs, np.nan), inputs, schedule)
@@ -167,19 +172,42 @@ class PolytopeObserver:
         maps = transitions(start.stack, self.model, inputs)
         return self._keep(sample, self._recursion.next(last, start, maps, sample), begun)
 
+    def state_dict(self) -> dict[str, NDArray]:
+        """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
+        facets = -1 if self.max_facets is None else self.max_facets
+        published = isinstance(self._recursion, PublishedRecursion)
+        state: dict[str, NDArray] = {"settings": np.array([self.horizon, facets, self.eps, published])}
+        state |= write_set("initial", self._initial)
+        if self._last is not None:
+            sample, outcome = self._last
+            state |= write_sample("sample", sample) | write_outcome("outcome", outcome)
+        return state
+
+    @classmethod
+    def from_state_dict(cls, model: UncertainModel, state: Mapping[str, NDArray]) -> PolytopeObserver:
+        """The observer that `state_dict` described, to continue bit for bit with the same model.
+
+        Raises
+        ------
+        ValueError
+            If the state is not that of a polytope observer of such a model.
+        """
+        try:
+            horizon, facets, eps, published = (float(v) for v in state["settings"])
+            limit = None if facets < 0 else int(facets)
+            observer = cls(model, read_set(state, "initial"), int(horizon), limit, eps, bool(published))
+            if "sample.stack" in state:
+                sample = read_sample(state, "sample")
+                if sample.stack.shape != model.stack(model.schedule).shape:
+                    raise ValueError(f"its stack has shape {sample.stack.shape}")
+                observer._last = sample, read_outcome(state, "outcome")
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise ValueError(f"state does not belong to a polytope observer of this model: {error}") from error
+        return observer
+
     def run(self, log: Log) -> PolytopeRecord:
         """All samples of a log, with the box of the state at each."""
-        if len(log) == 0:
-            raise ValueError("log has no samples; expected at least one")
-        steps = []
-        for k in range(len(log)):
-            following = log.u[k] if self.model.uses_input_in_output else None
-            schedule = log.schedule_at(k)
-            steps.append(
-                self.update(log.y[k], following, schedule)
-                if k == 0
-                else self.step(log.u[k - 1], log.y[k], following, schedule)
-            )
+        steps = steps_of(self, log, self.model.uses_input_in_output)
         boxes = np.array([step.box for step in steps])
         return PolytopeRecord(
             verdicts=tuple(step.verdict for step in steps),
@@ -204,33 +232,12 @@ class PolytopeObserver:
         )  # fmt: skip
 
     def _sample(self, number: int, y: ArrayLike, u: Array, schedule: Any) -> Sample:
-        outputs = np.asarray(y, dtype=float)
-        if outputs.shape != (self.model.n_outputs,):
-            raise ValueError(f"y has shape {outputs.shape}; expected ({self.model.n_outputs},), one value a sensor")
-        if np.isinf(outputs).any():
-            raise ValueError(f"y is {outputs}; expected finite numbers, or NaN for a missing sensor")
-        if self.model.is_scheduled and schedule is None:
-            raise ValueError("schedule is missing: the model has arrays that are functions of it: pass schedule=...")
-        stack = self.model.stack(schedule)
-        if not np.isfinite(stack).all():
-            raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected numbers")
+        outputs, stack = outputs_of(self.model, y), stack_at(self.model, schedule)
         lower, upper, noise = self.model.bounds(schedule)
         disturbances = self.model.disturbance_polytope
         if disturbances is None and lower.size:
             disturbances = HPolytope.box(lower, upper)
         return Sample(number, stack, disturbances, noise, u, outputs)
-
-    def _inputs(self, name: str, u: ArrayLike | None, needed: bool) -> Array:
-        size = self.model.n_inputs
-        if not needed or (u is None and size == 0):
-            return np.zeros(size)
-        if u is None:
-            why = ", since D or a D_i is not zero" if name != "u" else ""
-            raise ValueError(f"{name} is missing; expected shape ({size},){why}")
-        array = np.asarray(u, dtype=float)
-        if array.shape != (size,) or not np.isfinite(array).all():
-            raise ValueError(f"{name} has shape {array.shape}; expected finite numbers of shape ({size},)")
-        return array
 
 
 def _has_any(*arrays: Any) -> bool:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from polytopes import Certificate, HPolytope
+from svo.observers.data import directions_of
 from svo.observers.step import VerdictName
 from svo.observers.vertex_images import outer_support
 
@@ -96,6 +97,23 @@ class PolytopeStep:
         axes = np.eye(self.n, self.joint.dim)
         ends = outer_support(self.joint, np.vstack([axes, -axes]))
         return -ends[self.n :], ends[: self.n]
+
+    def support(self, directions: ArrayLike) -> Array:
+        """Outer bounds of d'x over the states at this sample, in any directions.
+
+        Parameters
+        ----------
+        directions : (k, n) array
+
+        Returns
+        -------
+        (k,) array
+            -inf once the model is falsified.
+        """
+        rows = directions_of(directions, self.n)
+        if self.verdict == "falsified":
+            return np.full(len(rows), -np.inf)
+        return outer_support(self.joint, np.hstack([rows, np.zeros((len(rows), self.joint.dim - self.n))]))
 
 
 @dataclass(frozen=True)

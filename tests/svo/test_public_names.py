@@ -17,7 +17,10 @@ from svo.faults import SensorFault, Step
 
 NAMES = {
     "polytopes": ["HPolytope"],
-    "svo": ["ArchitectureI", "ArchitectureII", "PolytopeObserver", "UncertainModel", "Uncertainty", "WindowObserver"],
+    "svo": [
+        "ArchitectureI", "ArchitectureII", "ConstrainedZonotopeObserver", "PolytopeObserver", "UncertainModel",
+        "Uncertainty", "WindowObserver",
+    ],
     "svo.plant": ["Plant"],
     "svo.faults": ["ActuatorFault", "Exponential", "Intermittent", "PlantFault", "Ramp", "SensorFault", "Step"],
     "svo.indices": ["detection_indices"],
@@ -35,6 +38,8 @@ ARGUMENTS = [
     (svo.PolytopeObserver.update, ["y0", "u", "schedule"]),
     (svo.PolytopeObserver.step, ["u", "y", "u_next", "schedule"]),
     (svo.PolytopeObserver.run, ["log"]),
+    (svo.ConstrainedZonotopeObserver, ["model", "initial", "max_generators", "max_constraints"]),
+    (svo.ConstrainedZonotopeObserver.step, ["u", "y", "u_next", "schedule"]),
     (ArchitectureI, ["nominal", "faults", "debounce", "recovery", "timeout"]),
     (ArchitectureII, ["nominal", "faults", "global_", "class_one", "debounce", "recovery", "timeout"]),
     (ArchitectureI.update, ["y0", "u", "schedule"]),

@@ -1,0 +1,161 @@
+"""Cost of the observers as the horizon, the number of uncertainties and the length of the log grow.
+
+Run with ``python -m benchmarks.growth``. CPU time of a step, boxes not read, all methods on the same logs in one run:
+
+horizon          a random linear plant of 4 states: the window observer, the paper's method (`PolytopeObserver`, 60
+                 facets), and one emptiness program a sample over the same window by HiGHS, rebuilt. (HiGHS warm and
+                 cvxpy on the same programs: ``python -m benchmarks.window_observer``.)
+uncertainties    q of rank one in the state equation: window, zonotope and polytope observer; a hull over the vertices
+                 of Delta in all steps would need 2^(q N) images
+memory           resident memory of a window observer over a long log (``--samples``)
+
+What a number of states costs is in ``python -m benchmarks.set_representations``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from time import process_time_ns
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from rich.progress import track
+
+from benchmarks._observers import OBSERVERS, arguments, console, linear_plant, save, table, window
+from polytopes import HPolytope
+from svo import UncertainModel, Uncertainty, WindowObserver
+from svo.log import Log
+from svo.observers.fallback import is_feasible
+
+SEED, SETTLE, SAMPLES = 20_261_128, 60, 160
+HORIZONS, COUNTS = (1, 2, 5, 10, 20, 50), (0, 1, 2, 3, 4, 5, 6)
+PAPER_HORIZON, PAPER_COUNT = 5, 3  # the largest for which the explicit sets are run
+LONGEST = 4.0  # seconds of CPU time that one method gets for a log
+
+
+def cost(observer: Any, log: Log, extra: Callable[[Any], object] | None = None) -> float:
+    """Mean CPU microseconds of a step; of ``extra`` instead, if given, after each step."""
+    times: list[float] = []
+    first = process_time_ns()
+    for k in range(len(log)):
+        begun = process_time_ns()
+        step = observer.update(log.y[k]) if k == 0 else observer.step(None, log.y[k])
+        if extra is not None:
+            begun = process_time_ns()
+            extra(observer)
+        times.append(1e-3 * (process_time_ns() - begun))
+        assert step.verdict != "falsified"
+        if 1e-9 * (process_time_ns() - first) > LONGEST:
+            break
+    return float(np.mean(times[min(SETTLE, len(times) // 2) :]))
+
+
+def highs_rebuilt(observer: WindowObserver) -> object:
+    """The emptiness program of the observer's present window, built and solved by HiGHS."""
+    w = observer._arrays
+    return is_feasible(w["G"], w["lower"], w["upper"])
+
+
+def over_horizons(rng: np.random.Generator) -> dict[str, dict[int, float]]:
+    """Cost by method and N."""
+    model = linear_plant(rng, 4)
+    log = model.simulate(np.zeros(4), np.zeros((SAMPLES, 0)), rng)
+    box = HPolytope.box(-np.ones(4), np.ones(4))
+    result: dict[str, dict[int, float]] = {"window observer": {}, "HiGHS, rebuilt, emptiness only": {}, "paper": {}}
+    for N in track(HORIZONS, "horizon", console=console, transient=True):
+        result["window observer"][N] = cost(window(N)(model, box), log)
+        result["HiGHS, rebuilt, emptiness only"][N] = cost(window(N)(model, box), log, highs_rebuilt)
+        if N <= PAPER_HORIZON:
+            result["paper"][N] = cost(OBSERVERS["polytope"](model, box, N), log)
+    result["paper's method, 60 facets"] = result.pop("paper")
+    return result
+
+
+def uncertain_plant(rng: np.random.Generator, base: UncertainModel, count: int) -> UncertainModel:
+    """With so many uncertainties of rank one in A, each of 2 % of its norm."""
+    n = base.n_states
+    parts = [np.outer(rng.normal(size=n), rng.normal(size=n)) for _ in range(count)]
+    return base.replace(uncertainties=[Uncertainty(A=0.02 * part / np.linalg.norm(part, 2)) for part in parts])
+
+
+def over_uncertainties(rng: np.random.Generator) -> dict[str, dict[int, float]]:
+    """Cost by method and number of uncertainties, N = 10."""
+    base = linear_plant(rng, 3)
+    box = HPolytope.box(-np.ones(3), np.ones(3))
+    result: dict[str, dict[int, float]] = {"window observer, N = 10": {}, "zonotope observer": {}, "paper": {}}
+    for q in track(COUNTS, "uncertainties", console=console, transient=True):
+        model = uncertain_plant(rng, base, q)
+        log = model.simulate(np.zeros(3), np.zeros((SAMPLES, 0)), rng)
+        result["window observer, N = 10"][q] = cost(window(10)(model, box), log)
+        result["zonotope observer"][q] = cost(OBSERVERS["zonotope"](model, box), log)
+        if q <= PAPER_COUNT:
+            result["paper"][q] = cost(OBSERVERS["polytope"](model, box), log)
+    result["paper's method, N = 1, 60 facets"] = result.pop("paper")
+    return result
+
+
+def resident_megabytes() -> float:
+    """Resident memory of this process (Linux)."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * 4096 / 1e6
+
+
+def memory(rng: np.random.Generator, samples: int) -> tuple[list[int], list[float]]:
+    """Resident memory along a log of so many samples, from the first tenth on."""
+    model = linear_plant(rng, 2)
+    observer, at, used = WindowObserver(model, HPolytope.box(-np.ones(2), np.ones(2))), [], []
+    chunk = max(samples // 20, 1)
+    x = np.zeros(2)
+    for part in track(range(-(-samples // chunk)), "memory", console=console, transient=True):
+        log = model.simulate(x, np.zeros((chunk + 1, 0)), rng)
+        for k in range(chunk):
+            step = observer.update(log.y[k]) if part == k == 0 else observer.step(None, log.y[k])
+            assert step.verdict == "consistent"
+        x = log.x[-1]
+        at.append((part + 1) * chunk)
+        used.append(resident_megabytes())
+    return at, used
+
+
+def main(given: list[str] | None = None) -> None:
+    """Measure, print and draw."""
+    parser = arguments("growth", __doc__)
+    parser.add_argument("--samples", type=int, default=20_000, help="of the log for the memory")
+    options = parser.parse_args([] if given is None else given)
+    rng = np.random.default_rng(SEED)
+    OBSERVERS["window"](linear_plant(rng, 2), HPolytope.box(-np.ones(2), np.ones(2))).warm_up()
+    panels = {"steps N": over_horizons(rng), "uncertainties": over_uncertainties(rng)}
+    at, used = memory(rng, options.samples)
+    figure, axes = plt.subplots(1, 3, figsize=(15, 4.3))
+    for ax, (what, methods) in zip(axes, panels.items(), strict=False):
+        values = sorted({v for times in methods.values() for v in times})
+        rows = [[name, *(f"{t[v]:.0f}" if v in t else "-" for v in values)] for name, t in methods.items()]
+        table(f"Mean CPU microseconds a sample, by number of {what}", ("method", *map(str, values)), rows)
+        for name, times in methods.items():
+            ax.plot(list(times), list(times.values()), marker="o", label=name)
+        ax.set_xlabel(f"number of {what}")
+        ax.set_ylabel("mean CPU time a sample [us]")
+        ax.set_yscale("log")
+    axes[0].set_xscale("log")
+    unit = panels["uncertainties"]["window observer, N = 10"][0]
+    vertices = [(q, 2.0 ** (10 * q)) for q in COUNTS if q <= 2]
+    costs = [unit * v for _, v in vertices]
+    axes[1].plot([q for q, _ in vertices], costs, "k:", label="window at q = 0, times 2^(10 q)")
+    for ax in axes[:2]:
+        ax.legend(fontsize=8)
+    axes[2].plot(at, used, marker="o")
+    axes[2].set_ylim(0, 1.2 * max(used))
+    axes[2].set_xlabel("samples")
+    axes[2].set_ylabel("resident memory [MB]")
+    times = panels["steps N"]["window observer"]
+    slope = np.polyfit(np.log([5, 10, 20, 50]), np.log([times[N] for N in (5, 10, 20, 50)]), 1)[0]
+    console.print(f"window observer: N^{slope:.2f} from 5 to 50 (aim 1.3)")
+    middle = len(used) // 2
+    console.print(f"memory over {at[-1]} samples: {used[middle]:.1f} MB half way, {used[-1]:.1f} MB at the end")
+    save(figure, options.out, "growth.png")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

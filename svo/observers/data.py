@@ -1,0 +1,70 @@
+"""What a user hands to an observer: checks of a sample's data, and the samples of a log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from svo.log import Log
+from svo.model import UncertainModel
+
+Array = NDArray[np.float64]
+
+
+def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:
+    """A measurement (ny,), NaN where a sensor is missing."""
+    array = np.asarray(y, dtype=float)
+    if array.shape != (model.n_outputs,):
+        raise ValueError(f"y has shape {array.shape}; expected ({model.n_outputs},), one value a sensor")
+    if np.isinf(array).any():
+        raise ValueError(f"y is {array}; expected finite numbers, or NaN for a missing sensor")
+    return array
+
+
+def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: bool) -> Array:
+    """An input (nu,); zeros where it is not needed."""
+    size = model.n_inputs
+    if not needed or (u is None and size == 0):
+        return np.zeros(size)
+    if u is None:
+        why = ", since D, a D_i or a channel shares it with the output" if name != "u" else ""
+        raise ValueError(f"{name} is missing; expected shape ({size},){why}")
+    array = np.asarray(u, dtype=float)
+    if array.shape != (size,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} has shape {array.shape}; expected finite numbers of shape ({size},)")
+    return array
+
+
+def stack_at(model: UncertainModel, schedule: Any) -> Array:
+    """The stack of a model at a sample, all finite."""
+    if model.is_scheduled and schedule is None:
+        raise ValueError("schedule is missing: the model has arrays that are functions of it: pass schedule=...")
+    stack = model.stack(schedule)
+    if not np.isfinite(stack).all():
+        raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected numbers")
+    return stack
+
+
+def directions_of(directions: ArrayLike, n: int) -> Array:
+    """Directions (k, n) of a support."""
+    rows = np.asarray(directions, dtype=float)
+    if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
+        raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {n})")
+    return rows
+
+
+def steps_of(observer: Any, log: Log, needs_next_input: bool) -> list[Any]:
+    """The answers of an observer that has not started, at every sample of a log."""
+    if len(log) == 0:
+        raise ValueError("log has no samples; expected at least one")
+    steps = []
+    for k in range(len(log)):
+        following = log.u[k] if needs_next_input else None
+        schedule = log.schedule_at(k)
+        if k == 0:
+            steps.append(observer.update(log.y[k], following, schedule))
+        else:
+            steps.append(observer.step(log.u[k - 1], log.y[k], following, schedule))
+    return steps

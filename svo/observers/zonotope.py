@@ -1,0 +1,274 @@
+"""The constrained-zonotope observer: sets that grow with the data and are reduced, for many states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes import HPolytope
+from svo.log import Log
+from svo.model import UncertainModel
+from svo.observers.constrained_zonotope import ConstrainedZonotope
+from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
+from svo.observers.proof import WindowSample
+from svo.observers.step import VerdictName
+from svo.observers.zonotope_program import ZonotopeProgram
+from svo.observers.zonotope_proof import ZonotopeCertificate
+from svo.observers.zonotope_reduction import reduced
+from svo.observers.zonotope_sample import Stage, StageBuilder
+from svo.observers.zonotope_step import ZonotopeRecord, ZonotopeStep
+
+Array = NDArray[np.float64]
+_SAMPLE = ("stack", "u", "y", "noise", "w_lower", "w_upper")
+
+
+class ConstrainedZonotopeObserver:
+    """Set-valued observer on constrained zonotopes (Scott et al., Automatica 69, 2016), in a form that is sound.
+
+    {c + G xi : |xi| <= 1, A xi = b} is closed under affine maps, sums and measurements; each sample adds generators and
+    constraints. What exceeds the limits is reduced to a superset, with the rounding of every operation added.
+
+    Parameters
+    ----------
+    model : UncertainModel
+    initial : HPolytope
+        Bounded set that contains the state at the first sample.
+    max_generators, max_constraints : int or None
+        Of the set of the state that goes on to the next sample; by default 8 n and 3 n. Larger is tighter and slower.
+    eps : float
+        Every measurement row is widened by eps (|y| + |C||x|max + |D u| + |c| + |F| wmax + n), for the rounding
+        of the data.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments that do not fit, and for an initial set that is empty or unbounded.
+
+    Notes
+    -----
+    "falsified" comes with a `ZonotopeCertificate` that was checked in exact arithmetic; it is conditional on the set of
+    the sample before and on the bounds of s of each channel. After it the observer stays falsified until `reset`.
+    Uncertainties enter as the channels of `WindowObserver`: exact where s keeps one sign, the convex hull otherwise.
+    """
+
+    def __init__(
+        self,
+        model: UncertainModel,
+        initial: HPolytope,
+        max_generators: int | None = None,
+        max_constraints: int | None = None,
+        eps: float = 1e-9,
+    ) -> None:
+        if not isinstance(model, UncertainModel):
+            raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
+        if not (np.isfinite(eps) and eps >= 0):
+            raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
+        n = model.n_states
+        self.model = model
+        self.eps = float(eps)
+        self.max_generators = _limit("max_generators", max_generators, 8 * n, n)
+        self.max_constraints = _limit("max_constraints", max_constraints, 3 * n, 0)
+        self._builder = StageBuilder(model, self.eps)
+        # Channels that the output may share are bounded at its sample, so what u says of them must be known then.
+        driven = any(callable(item.B) or bool(np.any(item.B)) for item in model.uncertainties if item.B is not None)
+        self._wants_next_input = model.uses_input_in_output or (self._builder.is_late and driven)
+        self.reset(initial)
+
+    # -- the protocol ----------------------------------------------------------------------------
+
+    def reset(self, set: HPolytope) -> None:
+        """Forget all data; the state at the next measurement lies in ``set``.
+
+        Raises
+        ------
+        ValueError
+            If the set is empty, unbounded or of the wrong dimension.
+        """
+        self._first = self._builder.first_set(set)
+        self._number = -1
+        self._stages: tuple[Stage, ...] = ()  # the last one goes on to the next sample
+        self._falsified: ZonotopeCertificate | None = None
+
+    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> ZonotopeStep:
+        """The first measurement, without a transition.
+
+        Parameters
+        ----------
+        y0 : (ny,) array
+            NaN = that sensor is missing.
+        u : (nu,) array, optional
+            Needed where `step` needs ``u_next``.
+        schedule : optional
+            Scheduling value at this sample.
+        """
+        begun = perf_counter()
+        if self._stages or self._falsified is not None:
+            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
+        inputs = inputs_of(self.model, "u", u, self._wants_next_input)
+        data = self._data(inputs, outputs_of(self.model, y0), schedule)
+        return self._conclude((), self._builder.measured(self._first, data), None, begun)
+
+    def step(
+        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
+    ) -> ZonotopeStep:
+        """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
+
+        Parameters
+        ----------
+        u : (nu,) array
+        y : (ny,) array
+            NaN = that sensor is missing; all NaN = prediction only.
+        u_next : (nu,) array, optional
+            u(k+1); needed only if D or a D_i is not zero, or if the output depends on w or an uncertainty (F, C_i,
+            c_i, F_i) while some B_i is not zero.
+        schedule : optional
+            Scheduling value at the sample of y; it also gives the matrices of the next transition.
+
+        Raises
+        ------
+        ValueError
+            For a wrong shape, an infinite or missing value, or a schedule that gives no finite matrices. The
+            observer is unchanged.
+        OverflowError
+            If the set has grown beyond what floats can hold. The observer is unchanged.
+        """
+        begun = perf_counter()
+        inputs = inputs_of(self.model, "u", u, True)
+        following = inputs_of(self.model, "u_next", u_next, self._wants_next_input)
+        outputs = outputs_of(self.model, y)
+        if self._falsified is not None:
+            return self._answer("falsified", self._stages[-1], begun)
+        data = self._data(following, outputs, schedule)
+        if not self._stages:
+            self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
+        before, states = self._builder.predicted(self._stages[-1], inputs)
+        if not states.is_finite():
+            raise OverflowError("the set of the next state has no finite bounds: too long without a measurement")
+        return self._conclude((before,), self._builder.measured(states, data), states, begun)
+
+    def run(self, log: Log) -> ZonotopeRecord:
+        """All samples of a log, with the box of the state at each."""
+        steps = steps_of(self, log, self._wants_next_input)
+        boxes = np.array([step.box for step in steps])
+        return ZonotopeRecord(
+            verdicts=tuple(step.verdict for step in steps),
+            lower=boxes[:, 0],
+            upper=boxes[:, 1],
+            seconds=np.array([step.seconds for step in steps]),
+            certificate=self._falsified,
+        )
+
+    def warm_up(self) -> float:
+        """Load and compile whatever a step needs, without touching this observer; returns the seconds it took."""
+        begun = perf_counter()
+        other = ConstrainedZonotopeObserver.__new__(ConstrainedZonotopeObserver)
+        other.__dict__.update(self.__dict__)
+        other._stages, other._falsified = (), None
+        y, u = np.full(self.model.n_outputs, np.nan), np.zeros(self.model.n_inputs)
+        other.update(y, u, self.model.schedule)
+        other.step(u, y, u, self.model.schedule).box  # noqa: B018
+        return perf_counter() - begun
+
+    def state_dict(self) -> dict[str, Array]:
+        """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
+        falsified = float(self._falsified is not None)
+        settings = [self._number, falsified, self.max_generators, self.max_constraints, self.eps]
+        state = {"settings": np.array(settings)} | _named("first", self._first)
+        for i, stage in enumerate(self._stages):
+            state |= _named(f"{i}.arrival", stage.arrival)
+            state |= {f"{i}.{name}": getattr(stage.data, name).copy() for name in _SAMPLE}
+        return state
+
+    @classmethod
+    def from_state_dict(cls, model: UncertainModel, state: Mapping[str, Array]) -> ConstrainedZonotopeObserver:
+        """The observer that `state_dict` described, to continue bit for bit with the same model.
+
+        Raises
+        ------
+        ValueError
+            If the state is not that of a constrained-zonotope observer of such a model.
+        """
+        try:
+            number, falsified, generators, constraints, eps = (float(v) for v in state["settings"])
+            n = model.n_states
+            observer = cls(model, HPolytope.box(np.zeros(n), np.zeros(n)), int(generators), int(constraints), eps)
+            observer._first = _read(state, "first")
+            observer._restore(int(number), bool(falsified), state)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise ValueError(f"state does not belong to a zonotope observer of this model: {error}") from error
+        return observer
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _data(self, u: Array, y: Array, schedule: Any) -> WindowSample:
+        return self._builder.data(stack_at(self.model, schedule), self.model.bounds(schedule), u, y)
+
+    def _conclude(
+        self, before: tuple[Stage, ...], now: Stage, states: ConstrainedZonotope | None, begun: float
+    ) -> ZonotopeStep:
+        """Decide whether anything explains the measurement, and keep what goes on to the next sample."""
+        self._number += 1
+        verdict = self._decide(before, now)
+        if verdict == "falsified":
+            self._stages = (*before, now)
+        elif states is None:
+            self._stages = (now,)
+        else:
+            arrival = reduced(states, self.max_generators, self.max_constraints)
+            self._stages = (self._builder.measured(arrival, now.data),)
+        return self._answer(verdict, now, begun)
+
+    def _decide(self, before: tuple[Stage, ...], now: Stage) -> VerdictName:
+        free = (*(j for stage in before for j in stage.on_p), *now.on_p)
+        answer = ZonotopeProgram(now.joint, free).feasibility()
+        if answer.status == "nonempty":
+            return "consistent"
+        if answer.status == "empty":
+            for multipliers in (answer.ray, -answer.ray):
+                self._falsified = self._builder.certificate((*before, now), multipliers, self._number)
+                if self._falsified is not None:
+                    return "falsified"
+        return "undecided"
+
+    def _answer(self, verdict: VerdictName, now: Stage, begun: float) -> ZonotopeStep:
+        return ZonotopeStep(
+            self._number, verdict, self._falsified, perf_counter() - begun, now.joint, self.model.n_states
+        )
+
+    def _restore(self, number: int, falsified: bool, state: Mapping[str, Array]) -> None:
+        """The stages, made again from their arrival sets and data as they were made first."""
+        stages: list[Stage] = []
+        while f"{len(stages)}.stack" in state:
+            i = len(stages)
+            values = {name: np.array(state[f"{i}.{name}"]) for name in _SAMPLE}
+            bounds = values["w_lower"], values["w_upper"], values["noise"]
+            data = self._builder.data(values["stack"], bounds, values["u"], values["y"])
+            arrival = _read(state, f"{i}.arrival")
+            if i:
+                before, arrival = self._builder.predicted(stages[-1], stages[-1].data.u)
+                stages[-1] = before
+            stages.append(self._builder.measured(arrival, data))
+        self._stages, self._number = tuple(stages), number
+        if falsified and self._decide(self._stages[:-1], self._stages[-1]) != "falsified":
+            raise ValueError("its falsification cannot be proven again")
+
+
+def _limit(name: str, value: int | None, default: int, least: int) -> int:
+    if value is None:
+        return default
+    if not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} is {value!r}; expected an integer of at least {least}, or None for {default}")
+    return int(value)
+
+
+def _named(prefix: str, Z: ConstrainedZonotope) -> dict[str, Array]:
+    return {f"{prefix}.{f.name}": getattr(Z, f.name).copy() for f in fields(Z)}
+
+
+def _read(state: Mapping[str, Array], prefix: str) -> ConstrainedZonotope:
+    return ConstrainedZonotope(**{f.name: np.array(state[f"{prefix}.{f.name}"]) for f in fields(ConstrainedZonotope)})
