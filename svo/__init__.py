@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from svo.model import UncertainModel
     from svo.observers.polytope import PolytopeObserver
     from svo.observers.window import WindowObserver
+    from svo.schedule_table import ScheduleTable
     from svo.uncertainty import Uncertainty
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Distinguishability",
     "Log",
     "PolytopeObserver",
+    "ScheduleTable",
     "UncertainModel",
     "Uncertainty",
     "Verdict",
@@ -42,6 +44,7 @@ _HOMES = {
     "Distinguishability": "svo.distinguish",
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",
+    "ScheduleTable": "svo.schedule_table",
     "UncertainModel": "svo.model",
     "Uncertainty": "svo.uncertainty",
     "Verdict": "svo.isolation.record",

@@ -111,6 +111,10 @@ class ProvingObserver(WindowObserver):
         """Of the falsification, once there is one."""
         return self._falsified
 
+    def _take(self, data: tuple[Any, ...]) -> VerdictName:
+        self._enter(data)
+        return self._solve(kernel.ARRIVAL)
+
     def _solve(self, task: int) -> VerdictName:
         if task != kernel.ARRIVAL:
             return super()._solve(task)

@@ -30,7 +30,6 @@ from svo.observers.window_step import WindowRecord, WindowStep
 Array = NDArray[np.float64]
 _GROWING_START = 16
 _LARGEST_BASIS = 128
-_ALL = 1 << 60  # programs: more than any task has
 _PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
 _ENTRY_ERRORS = {
     kernel.BAD_INPUT: "u is {u}; expected finite numbers",
@@ -354,14 +353,34 @@ class WindowObserver:
         end: float | None = None,
     ) -> WindowStep:
         w_old = self._last_bounds or w
-        code = kernel.enter(self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
-        if code in _ENTRY_ERRORS:
-            raise ValueError(_ENTRY_ERRORS[code].format(u=u, y=y))
-        self._settle_channels(code == kernel.SIGN_OPEN)
-        kernel.complete(self._window, self._size, first, self.eps)
+        data = (self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
+        if end is None:
+            verdict = self._take(data)
+        else:
+            self._enter(data)
+            verdict = self._solve_until(end)
         self._last_bounds = w
-        verdict = self._solve(kernel.ARRIVAL) if end is None else self._solve_until(end)
         return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+
+    def _take(self, data: tuple[Any, ...]) -> VerdictName:
+        """One sample with all its programs, in one compiled call unless the window seems empty."""
+        code, verdict, program = kernel.take(*data, self.eps, kernel.PIVOT_LIMIT)
+        self._check_entry(code, data)
+        if verdict == kernel.CONSISTENT:
+            return "consistent"
+        return self._conclude(kernel.ARRIVAL, verdict, program)
+
+    def _enter(self, data: tuple[Any, ...]) -> None:
+        """One sample without its programs, but for those of its channels."""
+        code = kernel.enter(*data)
+        self._check_entry(code, data)
+        self._settle_channels(code == kernel.SIGN_OPEN)
+        kernel.complete(*data[:3], self.eps)
+
+    @staticmethod
+    def _check_entry(code: int, data: tuple[Any, ...]) -> None:
+        if code in _ENTRY_ERRORS:
+            raise ValueError(_ENTRY_ERRORS[code].format(u=data[3], y=data[5]))
 
     def _settle_channels(self, sign_open: bool) -> None:
         """Tighten the bounds of those s whose sign is open."""
@@ -370,14 +389,16 @@ class WindowObserver:
 
     def _solve(self, task: int) -> VerdictName:
         """Solve the programs of a task; an empty window counts only once its certificate is proven."""
-        start = 0
-        while True:
-            verdict, program = kernel.solve(self._window, self._size, task, start, _ALL, kernel.PIVOT_LIMIT)
-            if verdict != kernel.EMPTY_CANDIDATE:
-                break
+        verdict, program = kernel.solve(self._window, self._size, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
+        return self._conclude(task, verdict, program)
+
+    def _conclude(self, task: int, verdict: int, program: int) -> VerdictName:
+        """What the programs of a task say; those after one that found the window empty have yet to be solved."""
+        while verdict == kernel.EMPTY_CANDIDATE:
             if task == kernel.ARRIVAL and self._prove():
                 return "falsified"
-            start = program + 1
+            after = program + 1
+            verdict, program = kernel.solve(self._window, self._size, task, after, kernel.ALL, kernel.PIVOT_LIMIT)
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
