@@ -8,6 +8,7 @@ model and the log alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -51,7 +52,16 @@ class ChainCheck:
     seconds: float
 
 
-def prove_chain(observer: WindowObserver, log: Log) -> ChainCheck:
+@dataclass(frozen=True, eq=False)
+class LateMeasurement:
+    """Outputs y (ny,) of sample ``taken`` that the observer got right after sample ``arrived``; NaN = not these."""
+
+    arrived: int
+    taken: int
+    y: Array
+
+
+def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasurement] = ()) -> ChainCheck:
     """Run a log again through an observer like the given one, and prove every bound up to its falsification.
 
     Parameters
@@ -59,8 +69,12 @@ def prove_chain(observer: WindowObserver, log: Log) -> ChainCheck:
     observer : WindowObserver
         Gives the model, the initial set, the horizon, the template and eps; it is left as it is.
     log : Log
+        With NaN where a measurement came late.
+    late : iterable of LateMeasurement
+        Those that did, in the order of their arrival.
     """
     begun = perf_counter()
+    waiting = list(late)
     again = ProvingObserver.like(observer)
     at = None
     for k in range(len(log)):
@@ -69,6 +83,9 @@ def prove_chain(observer: WindowObserver, log: Log) -> ChainCheck:
             step = again.update(log.y[0], log.u[0], schedule)
         else:
             step = again.step(log.u[k - 1], log.y[k], log.u[k], schedule)
+        for measurement in waiting:
+            if measurement.arrived == k and step.verdict != "falsified":
+                step = again.late_update(measurement.y, measurement.taken)
         if step.verdict == "falsified":
             at = k
             break

@@ -164,6 +164,54 @@ class WindowObserver:
         end = None if deadline is None else begun + deadline
         return self._sample(False, inputs, following, outputs, stack, noise, (w_lower, w_upper), begun, end)
 
+    def late_update(self, y: ArrayLike, sample: int) -> WindowStep:
+        """A measurement that arrives after its sample, while that sample is still in the window.
+
+        Its rows stand where they would have stood; the answer is about the newest sample, as that of the last
+        `step`, which it replaces. Alarms and their certificates, saved states and sets then include it.
+
+        Parameters
+        ----------
+        y : (ny,) array
+            Measured at ``sample``; NaN for the sensors that did not arrive now.
+        sample : int
+            Number of that sample (`WindowStep.sample` counts from 0), within `window`.
+
+        Raises
+        ------
+        ValueError
+            For a sample outside the window, a sensor that has been read there already, or a bad ``y``. The
+            observer is unchanged.
+        """
+        begun = perf_counter()
+        outputs = self._outputs(y)
+        if self._falsified is not None:
+            return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
+        first, last = self.window
+        if not (isinstance(sample, int | np.integer) and first <= sample <= last):
+            raise ValueError(f"sample is {sample!r}; expected one in the window, which holds {first} to {last}")
+        if np.isinf(outputs).any():
+            raise ValueError(_ENTRY_ERRORS[kernel.BAD_OUTPUT].format(y=y))
+        read = ~np.isnan(outputs) & ~np.isnan(self._arrays["y"][sample % (self._size.N + 1)])
+        if read.any():
+            raise ValueError(f"y has a value of sensor {int(np.argmax(read))}, which was already read at {sample}")
+        kernel.add_late(self._window, self._size, sample, outputs, self.eps)
+        verdict = self._solve(kernel.ARRIVAL)
+        return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """First and last sample that the window holds.
+
+        Raises
+        ------
+        ValueError
+            Before the first sample.
+        """
+        if not self._started:
+            raise ValueError("there is no sample yet; call update(y0), with NaN if there is no measurement")
+        return int(self._arrays["clock"][kernel.BASE]), self._time
+
     def state_dict(self) -> dict[str, Array]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
         settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps])
@@ -232,6 +280,8 @@ class WindowObserver:
         schedule = self.model.schedule
         other.update(y, u, schedule)
         other.step(u, y, u, schedule).box  # noqa: B018
+        other.step(u, y, u, schedule, deadline=0.0)
+        other.late_update(y, 0)
         kernel.channel_factors(self.model.stack(schedule), self._owner)
         return perf_counter() - begun
 
