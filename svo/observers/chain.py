@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from svo.log import Log
 from svo.observers import window_kernel as kernel
 from svo.observers.proof import WindowCertificate, certificate_of, exact
+from svo.observers.sign_split import SplitCertificate
 from svo.observers.step import VerdictName
 from svo.observers.window import WindowObserver
 
@@ -67,7 +68,8 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
     Parameters
     ----------
     observer : WindowObserver
-        Gives the model, the initial set, the horizon, the template and eps; it is left as it is.
+        Gives the model, the initial set, the horizon, the template and eps; it is left as it is. Convex hulls are
+        used even where it splits by signs, so what needs the split is found later or not at all.
     log : Log
         With NaN where a measurement came late.
     late : iterable of LateMeasurement
@@ -118,7 +120,7 @@ class ProvingObserver(WindowObserver):
     def like(cls, observer: WindowObserver) -> ProvingObserver:
         """One with the settings and the initial set of another, before its first sample."""
         again = cls.__new__(cls)
-        again._configure(observer.model, observer.horizon, observer._template, observer.eps)
+        again._configure(observer.model, observer.horizon, observer._template, observer.eps, 0)
         again.checked, again.unproven = 0, []
         again._begin(observer._initial, observer._first_steps)
         return again
@@ -126,6 +128,7 @@ class ProvingObserver(WindowObserver):
     @property
     def certificate(self) -> WindowCertificate | None:
         """Of the falsification, once there is one."""
+        assert not isinstance(self._falsified, SplitCertificate)  # it keeps the hulls
         return self._falsified
 
     def _take(self, data: tuple[Any, ...]) -> VerdictName:

@@ -16,6 +16,7 @@ from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
 from svo.observers.fallback import candidates, is_feasible
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
+from svo.observers.sign_split import SplitCertificate, SplitPrograms
 from svo.observers.step import VerdictName
 from svo.observers.window_setup import (
     channel_owners,
@@ -60,6 +61,11 @@ class WindowObserver:
     eps : float
         Every measurement row is widened by eps (|y| + |C||x|max + |D u| + |c| + |F| wmax + n), for the rounding
         of the data.
+    sign_split : int
+        Largest number of cells, by the signs of s of its channels p = Delta s, that a program is split into where
+        the convex hull of p is not exact: with enough of them sets and verdicts of models of rank-one
+        uncertainties are exact for the window. 0 keeps the hull. Costs a solution from scratch a cell; steps with
+        a deadline keep the hull.
 
     Notes
     -----
@@ -75,6 +81,7 @@ class WindowObserver:
         horizon: int | None = 10,
         template: str | ArrayLike = "box",
         eps: float = 1e-9,
+        sign_split: int = 0,
     ) -> None:
         if not isinstance(model, UncertainModel):
             raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
@@ -82,7 +89,9 @@ class WindowObserver:
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        self._configure(model, horizon, template_rows(template, model.n_states), eps)
+        if not isinstance(sign_split, int | np.integer) or sign_split < 0:
+            raise ValueError(f"sign_split is {sign_split!r}; expected a number of cells >= 0 (0 = convex hulls)")
+        self._configure(model, horizon, template_rows(template, model.n_states), eps, int(sign_split))
         self.reset(initial)
 
     # -- the protocol ----------------------------------------------------------------------------
@@ -214,7 +223,7 @@ class WindowObserver:
 
     def state_dict(self) -> dict[str, Array]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
-        settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps])
+        settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps, self.sign_split])
         first = {f"initial.{f.name}": getattr(self._initial, f.name) for f in fields(self._initial)}
         last = dict(zip(("w_old_lower", "w_old_upper"), self._last_bounds or (), strict=False))
         falsified = np.array(float(self._falsified is not None))
@@ -232,10 +241,10 @@ class WindowObserver:
             If the state is not that of a window observer of such a model.
         """
         try:
-            horizon, steps, eps = (float(v) for v in state["settings"])
+            horizon, steps, eps, cells = (float(v) for v in state["settings"])
             initial = ArrivalSet(**{f.name: np.array(state[f"initial.{f.name}"]) for f in fields(ArrivalSet)})
             observer = cls.__new__(cls)
-            observer._configure(model, None if horizon < 0 else int(horizon), state["template"], eps)
+            observer._configure(model, None if horizon < 0 else int(horizon), state["template"], eps, int(cells))
             observer._begin(initial, int(steps))
             for name, array in observer._arrays.items():
                 array[...] = state[name]
@@ -244,7 +253,7 @@ class WindowObserver:
         if "w_old_lower" in state:
             observer._last_bounds = (np.array(state["w_old_lower"]), np.array(state["w_old_upper"]))
         if state["falsified"]:
-            observer._falsified = certificate_of(observer._arrays, observer._size, observer._arrival())
+            observer._prove_again()
         return observer
 
     def run(self, log: Log) -> WindowRecord:
@@ -300,8 +309,11 @@ class WindowObserver:
     def _started(self) -> bool:
         return bool(self._arrays["clock"][kernel.STARTED])
 
-    def _configure(self, model: UncertainModel, horizon: int | None, template: Array, eps: float) -> None:
+    def _configure(
+        self, model: UncertainModel, horizon: int | None, template: Array, eps: float, sign_split: int
+    ) -> None:
         self.model = model
+        self.sign_split = sign_split
         self.horizon = None if horizon is None else int(horizon)
         self.eps = float(eps)
         self._block = 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
@@ -324,7 +336,7 @@ class WindowObserver:
         n, w = self.model.n_states, self._arrays
         w["h_lower"][:n], w["h_upper"][:n] = initial.box_lower, initial.box_upper
         kernel.initialise(self._window, self._size, initial.rows, initial.lower, initial.upper)
-        self._falsified: WindowCertificate | None = None
+        self._falsified: WindowCertificate | SplitCertificate | None = None
         self._last_bounds: tuple[Array, Array] | None = None
 
     def _allocate(self, steps: int) -> None:
@@ -414,6 +426,9 @@ class WindowObserver:
 
     def _take(self, data: tuple[Any, ...]) -> VerdictName:
         """One sample with all its programs, in one compiled call unless the window seems empty."""
+        if self.sign_split:
+            self._enter(data)
+            return self._solve(kernel.ARRIVAL)
         code, verdict, program = kernel.take(*data, self.eps, kernel.PIVOT_LIMIT)
         self._check_entry(code, data)
         if verdict == kernel.CONSISTENT:
@@ -439,6 +454,10 @@ class WindowObserver:
 
     def _solve(self, task: int) -> VerdictName:
         """Solve the programs of a task; an empty window counts only once its certificate is proven."""
+        if self.sign_split and task != kernel.CHANNELS:
+            split = SplitPrograms(self._arrays, self._window, self._size, self._arrival(), self.sign_split)
+            if split.is_needed:
+                return self._solve_split(split, task)
         verdict, program = kernel.solve(self._window, self._size, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
         return self._conclude(task, verdict, program)
 
@@ -452,6 +471,30 @@ class WindowObserver:
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
+
+    def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
+        """As `_solve`, each program over its cells."""
+        w, clock = self._arrays, self._arrays["clock"]
+        base, time = int(clock[kernel.BASE]), int(clock[kernel.TIME])
+        programs = {
+            kernel.ARRIVAL: range(*kernel.arrival_programs.py_func(self._size, base, time)),
+            kernel.NEWEST: range(2 * self._size.nt),
+            kernel.QUERY: range(1),
+        }[task]
+        prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
+        has_point = False
+        for program in programs:
+            sign = 1.0 - 2.0 * (program % 2)
+            target = w["answer"] if prefix is None else w[f"{prefix}_{'lower' if program % 2 else 'upper'}"]
+            at = 0 if prefix is None else program // 2
+            result = split.solve(task, program, lambda t=target, i=at, s=sign: float(s * t[i]))  # type: ignore[misc]
+            has_point = has_point or result.has_point
+            if result.proof is None:
+                target[at] = sign * result.value
+            elif task == kernel.ARRIVAL and result.proof.verify():
+                self._falsified = result.proof
+                return "falsified"
+        return "consistent" if has_point else "undecided"
 
     def _solve_until(self, end: float) -> VerdictName:
         """The arrival programs in small portions of pivots, until a time is reached."""
@@ -476,6 +519,13 @@ class WindowObserver:
         if certificate.verify():
             self._falsified = certificate
         return self._falsified is not None
+
+    def _prove_again(self) -> None:
+        """The proof of a falsification, from the window alone."""
+        if self.sign_split:
+            self._solve(kernel.ARRIVAL)
+        if self._falsified is None:
+            self._falsified = certificate_of(self._arrays, self._size, self._arrival())
 
     def _ask_highs(self) -> VerdictName:
         w = self._arrays
