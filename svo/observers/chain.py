@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from svo.log import Log
 from svo.observers import window_kernel as kernel
-from svo.observers.proof import WindowCertificate, certificate_of, exact
+from svo.observers.proof import WindowCertificate, exact
 from svo.observers.sign_split import SplitCertificate
 from svo.observers.step import VerdictName
 from svo.observers.window import WindowObserver
@@ -168,7 +168,7 @@ class ProvingObserver(WindowObserver):
         i, lower = program // 2, program % 2 == 1
         bound = exact(-self._arrays["new_lower"][i] if lower else self._arrays["new_upper"][i])
         direction = -self._arrays["T"][i] if lower else self._arrays["T"][i]
-        proven = self._with_multipliers(program).proven_bound(target, direction)
+        proven = self._with_multipliers(program, target, direction).proven_bound(target, direction)
         self._count(proven is not None and proven <= bound, f"arrival bound {program} of sample {target}")
 
     def _check_channel(self, v: int, q: int, side: int, basis: int | None) -> None:
@@ -180,7 +180,7 @@ class ProvingObserver(WindowObserver):
         bound = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q])
         known = self._known_part(f, time, v)
         bases = [None] if basis is None else [basis, None]
-        proofs = [self._with_multipliers(b).proven_bound(time, f[: size.n]) for b in bases]
+        proofs = [self._with_multipliers(b, time, f[: size.n]).proven_bound(time, f[: size.n]) for b in bases]
         holds = any(proof is not None and proof + known <= bound for proof in proofs)
         self._count(holds, f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time}")
 
@@ -194,14 +194,17 @@ class ProvingObserver(WindowObserver):
             total += exact(value) * exact(high if value > 0 else low)
         return total
 
-    def _with_multipliers(self, basis: int | None) -> WindowCertificate:
-        """The window with the multipliers of the program solved last, whose basis is given; None: without any."""
+    def _with_multipliers(self, basis: int | None, sample: int, direction: Array) -> WindowCertificate:
+        """The window with the multipliers of the program solved last, whose basis is given; None: without any.
+
+        They are to prove a bound of the direction at the sample.
+        """
         w = self._arrays
         w["farkas"][:] = 0.0
         if basis is not None:
             k = int(w["k"][basis])
             w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
-        return certificate_of(w, self._size, self._arrival())
+        return self._certificate((sample, direction))
 
     def _count(self, holds: bool, what: str) -> None:
         self.checked += 1

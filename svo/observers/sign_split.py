@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.observers import window_kernel as kernel
-from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample, certificate_of
+from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
 
 Array = NDArray[np.float64]
 Cell = dict[tuple[int, int], tuple[float, float]]  # (sample, channel): bounds of its s
@@ -119,15 +119,21 @@ class SplitPrograms:
     ----------
     arrays, window, size
         Of the kernel.
-    arrival : ArrivalSet
+    certificate : callable
+        The certificate of the window as it stands.
     limit : int
         Largest number of cells that a program may have.
     """
 
     def __init__(
-        self, arrays: dict[str, Any], window: Any, size: kernel.Sizes, arrival: ArrivalSet, limit: int
+        self,
+        arrays: dict[str, Any],
+        window: Any,
+        size: kernel.Sizes,
+        certificate: Callable[[], WindowCertificate],
+        limit: int,
     ) -> None:
-        self._w, self._window, self._size, self._arrival, self._limit = arrays, window, size, arrival, limit
+        self._w, self._window, self._size, self._certificate, self._limit = arrays, window, size, certificate, limit
         self._open = dict(self._open_channels())
         self._saved = {name: arrays[name].copy() for name in _CHANGED}
         base, time = int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME])
@@ -150,7 +156,7 @@ class SplitPrograms:
                 count += 1
                 has_point = has_point or verdict == kernel.CONSISTENT
                 if verdict == kernel.EMPTY_CANDIDATE:
-                    proof = certificate_of(self._w, self._size, self._arrival)
+                    proof = self._certificate()
                     if proof.verify():
                         proofs.append(proof)
                         continue

@@ -15,6 +15,7 @@ from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
 from svo.observers.fallback import candidates, is_feasible
+from svo.observers.output_injection import OutputInjection, can_inject
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
 from svo.observers.sign_split import SplitCertificate, SplitPrograms
 from svo.observers.step import VerdictName
@@ -205,6 +206,9 @@ class WindowObserver:
         if read.any():
             raise ValueError(f"y has a value of sensor {int(np.argmax(read))}, which was already read at {sample}")
         kernel.add_late(self._window, self._size, sample, outputs, self.eps)
+        if self._injection is not None:  # the sample was incomplete, so it is as it was given
+            s = sample % (self._size.N + 1)
+            self._arrays["given.y"][s], self._arrays["given.slack"][s] = self._arrays["y"][s], self._arrays["slack"][s]
         verdict = self._solve(kernel.ARRIVAL)
         return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
 
@@ -320,6 +324,8 @@ class WindowObserver:
         self._template = template
         self._owner = channel_owners(model)
         self._late = output_is_disturbed(model)
+        sizes = model.n_states, model.n_inputs, model.n_disturbances
+        self._injection = OutputInjection(*sizes) if can_inject(model) else None
         # Channels that the output may share are bounded at its sample, so what u says of them must be known then.
         driven = any(callable(u.B) or (u.B is not None and bool(np.any(u.B))) for u in model.uncertainties)
         self._wants_next_input = model.uses_input_in_output or (self._late and driven)
@@ -341,17 +347,18 @@ class WindowObserver:
 
     def _allocate(self, steps: int) -> None:
         model, polytope = self.model, self.model.disturbance_polytope
+        n = model.n_states
+        nw = model.n_disturbances + (0 if self._injection is None else n)
         w_rows = (
             joint_rows(polytope)
             if polytope is not None
-            else (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0))
+            else (np.zeros((0, nw)), np.zeros(0), np.zeros(0))
         )
-        n = model.n_states
-        nv, nr = model.n_disturbances + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
+        nv, nr = nw + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
         na = max(len(self._template), len(self._initial.rows))
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
         self._size = kernel.Sizes(
-            n=n, nu=model.n_inputs, nw=model.n_disturbances, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
+            n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
             nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps, block=self._block,
             K=min(rows, columns, _LARGEST_BASIS) + 2, late=int(self._late),
         )  # fmt: skip
@@ -362,7 +369,9 @@ class WindowObserver:
         w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
         w["w_rows"][:], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
         w["jitter"][:] = jitter(w["jitter"].size)
-        self._window = kernel.new_window(w)
+        self._window = kernel.new_window(dict(w))
+        if self._injection is not None:
+            w |= self._injection.allocate(self._size)
 
     def _grow(self) -> None:
         """Twice the room; nothing has wrapped around yet, so every array is a leading block of the larger one."""
@@ -426,7 +435,7 @@ class WindowObserver:
 
     def _take(self, data: tuple[Any, ...]) -> VerdictName:
         """One sample with all its programs, in one compiled call unless the window seems empty."""
-        if self.sign_split:
+        if self.sign_split or self._injection is not None:
             self._enter(data)
             return self._solve(kernel.ARRIVAL)
         code, verdict, program = kernel.take(*data, self.eps, kernel.PIVOT_LIMIT)
@@ -437,10 +446,47 @@ class WindowObserver:
 
     def _enter(self, data: tuple[Any, ...]) -> None:
         """One sample without its programs, but for those of its channels."""
+        injected, given = False, data
+        if self._injection is not None:
+            data, injected = self._inject(data)
         code = kernel.enter(*data)
-        self._check_entry(code, data)
+        self._check_entry(code, given)
+        w, s = self._arrays, self._time % (self._size.N + 1)
+        if self._injection is not None:  # it is for outputs that w enters, where the clock has moved on by now
+            w["given.stack"][s], w["given.y"][s], w["given.injected"][s] = given[6], given[5], injected
+            w["given.slack"][s] = 0.0
         self._settle_channels(code == kernel.SIGN_OPEN)
+        if injected:
+            self._widen(given)
         kernel.complete(*data[:3], self.eps)
+        if self._injection is not None and not injected:
+            w["given.slack"][s] = w["slack"][s]
+
+    def _inject(self, data: tuple[Any, ...]) -> tuple[tuple[Any, ...], bool]:
+        """A sample's data with w injected where y is complete."""
+        assert self._injection is not None
+        *head, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper = data
+        stack, y, noise, injected = self._injection.transform(stack, y, (w_lower, w_upper))
+        none = np.zeros(self.model.n_states)
+        bounds = (np.concatenate([b, none]) for b in (w_old_lower, w_old_upper, w_lower, w_upper))
+        return (*head, y, stack, noise, *bounds), injected
+
+    def _widen(self, given: tuple[Any, ...]) -> None:
+        """Bounds of what the injection leaves to the state and to the box of w, by what is known of the state."""
+        assert self._injection is not None
+        u, y, stack, w = given[4], given[5], given[6], given[10:12]
+        s, v = self._time % (self._size.N + 1), self._time % (self._size.N + self._size.late)
+        arrays, nw = self._arrays, self.model.n_disturbances
+        d, widening, slack = self._injection.widths(stack, y, u, arrays["mag"][s], w, self.eps)
+        arrays["w_lower"][v, nw:], arrays["w_upper"][v, nw:] = -d, d
+        arrays["noise"][s] += widening
+        arrays["given.slack"][s] = slack
+
+    def _certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
+        """Of the multipliers at hand, about the model and the data as given."""
+        if self._injection is not None:
+            return self._injection.certificate(self._arrays, self._size, self._arrival(), objective)
+        return certificate_of(self._arrays, self._size, self._arrival())
 
     @staticmethod
     def _check_entry(code: int, data: tuple[Any, ...]) -> None:
@@ -455,7 +501,7 @@ class WindowObserver:
     def _solve(self, task: int) -> VerdictName:
         """Solve the programs of a task; an empty window counts only once its certificate is proven."""
         if self.sign_split and task != kernel.CHANNELS:
-            split = SplitPrograms(self._arrays, self._window, self._size, self._arrival(), self.sign_split)
+            split = SplitPrograms(self._arrays, self._window, self._size, self._certificate, self.sign_split)
             if split.is_needed:
                 return self._solve_split(split, task)
         verdict, program = kernel.solve(self._window, self._size, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
@@ -515,7 +561,7 @@ class WindowObserver:
 
     def _prove(self) -> bool:
         """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
-        certificate = certificate_of(self._arrays, self._size, self._arrival())
+        certificate = self._certificate()
         if certificate.verify():
             self._falsified = certificate
         return self._falsified is not None
@@ -525,7 +571,7 @@ class WindowObserver:
         if self.sign_split:
             self._solve(kernel.ARRIVAL)
         if self._falsified is None:
-            self._falsified = certificate_of(self._arrays, self._size, self._arrival())
+            self._falsified = self._certificate()
 
     def _ask_highs(self) -> VerdictName:
         w = self._arrays
