@@ -428,7 +428,7 @@ class WindowObserver:
         if end is None:
             verdict = self._take(data)
         else:
-            self._enter(data)
+            self._enter(data, end)
             verdict = self._solve_until(end)
         self._last_bounds = w
         return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
@@ -444,8 +444,8 @@ class WindowObserver:
             return "consistent"
         return self._conclude(kernel.ARRIVAL, verdict, program)
 
-    def _enter(self, data: tuple[Any, ...]) -> None:
-        """One sample without its programs, but for those of its channels."""
+    def _enter(self, data: tuple[Any, ...], end: float | None = None) -> None:
+        """One sample without its programs, but for those of its channels, which stop at the time ``end``."""
         injected, given = False, data
         if self._injection is not None:
             data, injected = self._inject(data)
@@ -455,7 +455,13 @@ class WindowObserver:
         if self._injection is not None:  # it is for outputs that w enters, where the clock has moved on by now
             w["given.stack"][s], w["given.y"][s], w["given.injected"][s] = given[6], given[5], injected
             w["given.slack"][s] = 0.0
-        self._settle_channels(code == kernel.SIGN_OPEN)
+        if end is None:
+            self._settle_channels(code == kernel.SIGN_OPEN)
+        elif code == kernel.SIGN_OPEN:
+            v = self._time % (self._size.N + self._size.late)
+            for program in range(2 * self._size.nq):
+                if w["s_lower"][v, program // 2] < 0.0 < w["s_upper"][v, program // 2]:
+                    self._solve_in_portions(kernel.CHANNELS, program, end)
         if injected:
             self._widen(given)
         kernel.complete(*data[:3], self.eps)
@@ -547,17 +553,23 @@ class WindowObserver:
         clock, decided = self._arrays["clock"], False
         base, time = clock[kernel.BASE], clock[kernel.TIME]
         for program in range(*kernel.arrival_programs.py_func(self._size, base, time)):
-            verdict, late = kernel.UNDECIDED, False
-            while verdict == kernel.UNDECIDED and not late:
-                late = perf_counter() >= end
-                portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
-                verdict, _ = kernel.solve(self._window, self._size, kernel.ARRIVAL, program, program + 1, portion)
+            verdict = self._solve_in_portions(kernel.ARRIVAL, program, end)
             if verdict == kernel.EMPTY_CANDIDATE and self._prove():
                 return "falsified"
             decided = decided or verdict == kernel.CONSISTENT
         if time - base == self._size.N:
             clock[kernel.PENDING] = 1
         return "consistent" if decided else "undecided"
+
+    def _solve_in_portions(self, task: int, program: int, end: float) -> int:
+        """One program, its pivots in portions until it is decided or the time ``end`` is reached."""
+        verdict, late, done = kernel.UNDECIDED, False, 0
+        while verdict == kernel.UNDECIDED and not late:
+            late = perf_counter() >= end or done >= kernel.PIVOT_LIMIT
+            portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
+            verdict, _ = kernel.solve(self._window, self._size, task, program, program + 1, portion)
+            done += portion
+        return int(verdict)
 
     def _prove(self) -> bool:
         """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
