@@ -73,6 +73,9 @@ class WindowObserver:
     Guarantees. The true state stays inside `Step.set` and the verdict is never "falsified" while the plant
     keeps to the model; "falsified" comes with a `WindowCertificate` that was checked in exact arithmetic.
     After it the observer stays falsified until `reset`.
+
+    Where exact sensors read the disturbance (F square and invertible, no noise), w leaves the program at samples
+    with all sensors, by itself (`svo.observers.output_injection`).
     """
 
     def __init__(
