@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from svo.observers.polytope import PolytopeObserver
     from svo.observers.window import WindowObserver
     from svo.observers.zonotope import ConstrainedZonotopeObserver
+    from svo.schedule_table import ScheduleTable
     from svo.uncertainty import Uncertainty
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Distinguishability",
     "Log",
     "PolytopeObserver",
+    "ScheduleTable",
     "UncertainModel",
     "Uncertainty",
     "Verdict",
@@ -45,6 +47,7 @@ _HOMES = {
     "Distinguishability": "svo.distinguish",
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",
+    "ScheduleTable": "svo.schedule_table",
     "UncertainModel": "svo.model",
     "Uncertainty": "svo.uncertainty",
     "Verdict": "svo.isolation.record",

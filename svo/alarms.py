@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from svo.log import Log
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
+from svo.observers.sign_split import SplitCertificate
 
 Array = NDArray[np.float64]
 FORMAT = "svo-alarm-1"
@@ -38,7 +39,7 @@ class Alarm:
         Sample of the log at which it was falsified.
     time : float
         Time of that sample [s].
-    certificate : WindowCertificate
+    certificate : WindowCertificate or SplitCertificate
     source : mapping
         Where the data come from: plant, noise set, seed, file.
     """
@@ -46,7 +47,7 @@ class Alarm:
     observer: str
     sample: int
     time: float
-    certificate: WindowCertificate
+    certificate: WindowCertificate | SplitCertificate
     source: Mapping[str, str | int | float]
 
 
@@ -165,7 +166,7 @@ def _encode_value(value: Any) -> Any:
         return {"shape": list(value.shape), "hex": " ".join(_hex(v) for v in value.ravel())}
     if isinstance(value, tuple):
         return [_encode_value(item) for item in value]
-    if isinstance(value, WindowCertificate | WindowSample | ArrivalSet):
+    if isinstance(value, SplitCertificate | WindowCertificate | WindowSample | ArrivalSet):
         return {f.name: _encode_value(getattr(value, f.name)) for f in fields(value)}
     return value
 
@@ -201,7 +202,14 @@ def _decode_array(value: Any) -> Array:
     return numbers.reshape(value["shape"])
 
 
-def _decode_certificate(record: Mapping[str, Any]) -> WindowCertificate:
+def _decode_certificate(record: Mapping[str, Any]) -> WindowCertificate | SplitCertificate:
+    if "cells" in record:
+        cells = tuple(_decode_cell(cell) for cell in record["cells"])
+        return SplitCertificate(cells, _decode_array(record["s_lower"]), _decode_array(record["s_upper"]))
+    return _decode_cell(record)
+
+
+def _decode_cell(record: Mapping[str, Any]) -> WindowCertificate:
     arrays = {key: _decode_array(value) for key, value in record.items() if isinstance(value, dict) and "hex" in value}
     return WindowCertificate(
         first=int(record["first"]),

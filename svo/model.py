@@ -21,6 +21,7 @@ from polytopes import HPolytope
 from svo.checks import check_disturbance_box, check_noise, finite_array
 from svo.discretisation import discretise
 from svo.log import Log
+from svo.schedule_table import ScheduleTable
 from svo.simulation import simulate
 from svo.uncertainty import Schedulable, Uncertainty
 
@@ -118,6 +119,7 @@ class UncertainModel:
     layout: Layout = field(init=False, repr=False)
     _constant: Array = field(init=False, repr=False)
     _scheduled: tuple[_Scheduled, ...] = field(init=False, repr=False)
+    _table: ScheduleTable | None = field(init=False, repr=False)
     _bounds: tuple[Any, Any, Any] = field(init=False, repr=False)
     _bounds_scheduled: bool = field(init=False, repr=False)
 
@@ -129,6 +131,7 @@ class UncertainModel:
         constant, scheduled = self._split()
         object.__setattr__(self, "_constant", constant)
         object.__setattr__(self, "_scheduled", scheduled)
+        object.__setattr__(self, "_table", self._tabulate())
         object.__setattr__(self, "_bounds", (*self._disturbance_bounds(), self._noise_bound()))
         object.__setattr__(self, "_bounds_scheduled", any(callable(b) for b in self._bounds))
         if self._bounds_scheduled and self.schedule is None:
@@ -184,6 +187,8 @@ class UncertainModel:
         """
         if not self._scheduled:
             return self._constant
+        if self._table is not None:
+            return self._table(schedule)
         stack = self._constant.copy()
         for entry in self._scheduled:
             value = np.asarray(entry.function(schedule), dtype=float)
@@ -341,6 +346,19 @@ class UncertainModel:
                     constant[where] = array
         constant.setflags(write=False)
         return constant, tuple(scheduled)
+
+    def _tabulate(self) -> ScheduleTable | None:
+        """The whole stack as one table, where every scheduled array is a table over the same points."""
+        first = self._scheduled[0].function if self._scheduled else None
+        if not isinstance(first, ScheduleTable):
+            return None
+        stacks = np.repeat(self._constant[None], len(first.points), axis=0)
+        for entry in self._scheduled:
+            table = entry.function
+            if not (isinstance(table, ScheduleTable) and table.has_points_of(first)):
+                return None
+            stacks[(slice(None), *entry.where)] = table.values
+        return ScheduleTable(first.points, stacks)
 
     def _shape_message(self, item: int, name: str, shape: tuple[int, ...]) -> str:
         owner = "" if item == 0 else f" of uncertainty {self.uncertainties[item - 1].name or item - 1}"

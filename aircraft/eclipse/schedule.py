@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from svo.schedule_table import ScheduleTable
 
 Array = NDArray[np.float64]
 
@@ -40,9 +41,8 @@ class AirspeedFilter:
 class ScheduledBlocks:
     """Named arrays tabulated over airspeed and interpolated linearly, all at once.
 
-    The blocks of the last schedule are remembered, so that the observers of a bank, which all ask for the
-    same sample, share the work. Outside the table its nearest end is used: the derivatives are valid
-    from 25 to 55 m/s only, and the mismatch bounds promise nothing beyond.
+    Outside the table its nearest end is used: the derivatives are valid from 25 to 55 m/s only, and the
+    mismatch bounds promise nothing beyond.
 
     Parameters
     ----------
@@ -54,13 +54,12 @@ class ScheduledBlocks:
     start: float
     step: float
     tables: Mapping[str, Array]
-    _flat: Array = field(init=False, repr=False)
+    _flat: ScheduleTable = field(init=False, repr=False)
     _layout: tuple[tuple[str, slice, tuple[int, ...]], ...] = field(init=False, repr=False)
-    _last: list[tuple[Any, dict[str, Array]]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         points = {len(table) for table in self.tables.values()}
-        if len(points) != 1 or points.pop() < 2:
+        if len(points) != 1 or (count := points.pop()) < 2:
             raise ValueError(f"tables have {[len(t) for t in self.tables.values()]} points; expected one count >= 2")
         layout, first = [], 0
         for name, table in self.tables.items():
@@ -68,42 +67,27 @@ class ScheduledBlocks:
             layout.append((name, slice(first, first + size), table.shape[1:]))
             first += size
         flat = np.hstack([np.asarray(table).reshape(len(table), -1) for table in self.tables.values()])
-        object.__setattr__(self, "_flat", flat)
+        object.__setattr__(self, "_flat", ScheduleTable(self.start + self.step * np.arange(count), flat))
         object.__setattr__(self, "_layout", tuple(layout))
-        object.__setattr__(self, "_last", [(None, {})])
 
     def at(self, schedule: Any) -> dict[str, Array]:
-        """All blocks at one airspeed [m/s]; the arrays are shared between callers and read-only.
+        """All blocks at one airspeed [m/s].
 
         Raises
         ------
         ValueError
             If the schedule is not a finite number.
         """
-        remembered, blocks = self._last[0]
-        if schedule != remembered:
-            row = self._interpolate(float(schedule))
-            blocks = {name: row[where].reshape(shape) for name, where, shape in self._layout}
-            self._last[0] = (schedule, blocks)  # one assignment: safe where observers run in threads
-        return blocks
+        row = self._flat(schedule)
+        return {name: row[where].reshape(shape) for name, where, shape in self._layout}
 
     def over(self, schedule: ArrayLike) -> dict[str, Array]:
         """Blocks at many airspeeds (K,): name to (K, ...) array."""
-        rows = np.array([self._interpolate(float(airspeed)) for airspeed in np.asarray(schedule)])
+        rows = np.array([self._flat(airspeed) for airspeed in np.asarray(schedule)])
         return {name: rows[:, where].reshape(len(rows), *shape) for name, where, shape in self._layout}
 
-    def _interpolate(self, airspeed: float) -> Array:
-        if not math.isfinite(airspeed):
-            raise ValueError(f"schedule is {airspeed}; expected a finite airspeed in m/s")
-        position = min(max((airspeed - self.start) / self.step, 0.0), len(self._flat) - 1.0)
-        index = min(int(position), len(self._flat) - 2)
-        fraction = position - index
-        row = (1.0 - fraction) * self._flat[index] + fraction * self._flat[index + 1]
-        row.setflags(write=False)
-        return row
-
-    def block(self, name: str) -> Callable[[Any], Array]:
+    def block(self, name: str) -> ScheduleTable:
         """One block as a function of the schedule."""
         if name not in self.tables:
             raise ValueError(f"name is {name!r}; expected one of {', '.join(self.tables)}")
-        return lambda schedule: self.at(schedule)[name]
+        return ScheduleTable(self._flat.points, self.tables[name])

@@ -10,14 +10,21 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.model import Schedulable, UncertainModel, Uncertainty
+from svo.schedule_table import ScheduleTable
 
 Array = NDArray[np.float64]
 
 
 def mapped(function: Callable[..., Array], *values: Schedulable) -> Schedulable:
-    """``function`` of arrays; again a function of the schedule where any of them is one."""
-    if not any(callable(v) for v in values):
+    """``function``, which must be affine, of arrays; again a function of the schedule where any of them is one."""
+    functions = [v for v in values if callable(v)]
+    if not functions:
         return function(*(np.asarray(v, dtype=float) for v in values))
+    tables = [f for f in functions if isinstance(f, ScheduleTable)]
+    if len(tables) == len(functions) and all(t.has_points_of(tables[0]) for t in tables):
+        return ScheduleTable.of(
+            function, *(v if isinstance(v, ScheduleTable) else np.asarray(v, dtype=float) for v in values)
+        )
 
     def at(schedule: Any) -> Array:
         return function(*(np.asarray(v(schedule) if callable(v) else v, dtype=float) for v in values))

@@ -8,6 +8,7 @@ model and the log alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 
 from svo.log import Log
 from svo.observers import window_kernel as kernel
-from svo.observers.proof import WindowCertificate, certificate_of, exact
+from svo.observers.proof import WindowCertificate, exact
+from svo.observers.sign_split import SplitCertificate
 from svo.observers.step import VerdictName
 from svo.observers.window import WindowObserver
 
@@ -51,16 +53,30 @@ class ChainCheck:
     seconds: float
 
 
-def prove_chain(observer: WindowObserver, log: Log) -> ChainCheck:
+@dataclass(frozen=True, eq=False)
+class LateMeasurement:
+    """Outputs y (ny,) of sample ``taken`` that the observer got right after sample ``arrived``; NaN = not these."""
+
+    arrived: int
+    taken: int
+    y: Array
+
+
+def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasurement] = ()) -> ChainCheck:
     """Run a log again through an observer like the given one, and prove every bound up to its falsification.
 
     Parameters
     ----------
     observer : WindowObserver
-        Gives the model, the initial set, the horizon, the template and eps; it is left as it is.
+        Gives the model, the initial set, the horizon, the template and eps; it is left as it is. Convex hulls are
+        used even where it splits by signs, so what needs the split is found later or not at all.
     log : Log
+        With NaN where a measurement came late.
+    late : iterable of LateMeasurement
+        Those that did, in the order of their arrival.
     """
     begun = perf_counter()
+    waiting = list(late)
     again = ProvingObserver.like(observer)
     at = None
     for k in range(len(log)):
@@ -69,6 +85,9 @@ def prove_chain(observer: WindowObserver, log: Log) -> ChainCheck:
             step = again.update(log.y[0], log.u[0], schedule)
         else:
             step = again.step(log.u[k - 1], log.y[k], log.u[k], schedule)
+        for measurement in waiting:
+            if measurement.arrived == k and step.verdict != "falsified":
+                step = again.late_update(measurement.y, measurement.taken)
         if step.verdict == "falsified":
             at = k
             break
@@ -101,7 +120,7 @@ class ProvingObserver(WindowObserver):
     def like(cls, observer: WindowObserver) -> ProvingObserver:
         """One with the settings and the initial set of another, before its first sample."""
         again = cls.__new__(cls)
-        again._configure(observer.model, observer.horizon, observer._template, observer.eps)
+        again._configure(observer.model, observer.horizon, observer._template, observer.eps, 0)
         again.checked, again.unproven = 0, []
         again._begin(observer._initial, observer._first_steps)
         return again
@@ -109,7 +128,12 @@ class ProvingObserver(WindowObserver):
     @property
     def certificate(self) -> WindowCertificate | None:
         """Of the falsification, once there is one."""
+        assert not isinstance(self._falsified, SplitCertificate)  # it keeps the hulls
         return self._falsified
+
+    def _take(self, data: tuple[Any, ...]) -> VerdictName:
+        self._enter(data)
+        return self._solve(kernel.ARRIVAL)
 
     def _solve(self, task: int) -> VerdictName:
         if task != kernel.ARRIVAL:
@@ -144,7 +168,7 @@ class ProvingObserver(WindowObserver):
         i, lower = program // 2, program % 2 == 1
         bound = exact(-self._arrays["new_lower"][i] if lower else self._arrays["new_upper"][i])
         direction = -self._arrays["T"][i] if lower else self._arrays["T"][i]
-        proven = self._with_multipliers(program).proven_bound(target, direction)
+        proven = self._with_multipliers(program, target, direction).proven_bound(target, direction)
         self._count(proven is not None and proven <= bound, f"arrival bound {program} of sample {target}")
 
     def _check_channel(self, v: int, q: int, side: int, basis: int | None) -> None:
@@ -156,7 +180,7 @@ class ProvingObserver(WindowObserver):
         bound = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q])
         known = self._known_part(f, time, v)
         bases = [None] if basis is None else [basis, None]
-        proofs = [self._with_multipliers(b).proven_bound(time, f[: size.n]) for b in bases]
+        proofs = [self._with_multipliers(b, time, f[: size.n]).proven_bound(time, f[: size.n]) for b in bases]
         holds = any(proof is not None and proof + known <= bound for proof in proofs)
         self._count(holds, f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time}")
 
@@ -170,14 +194,17 @@ class ProvingObserver(WindowObserver):
             total += exact(value) * exact(high if value > 0 else low)
         return total
 
-    def _with_multipliers(self, basis: int | None) -> WindowCertificate:
-        """The window with the multipliers of the program solved last, whose basis is given; None: without any."""
+    def _with_multipliers(self, basis: int | None, sample: int, direction: Array) -> WindowCertificate:
+        """The window with the multipliers of the program solved last, whose basis is given; None: without any.
+
+        They are to prove a bound of the direction at the sample.
+        """
         w = self._arrays
         w["farkas"][:] = 0.0
         if basis is not None:
             k = int(w["k"][basis])
             w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
-        return certificate_of(w, self._size, self._arrival())
+        return self._certificate((sample, direction))
 
     def _count(self, holds: bool, what: str) -> None:
         self.checked += 1

@@ -361,9 +361,26 @@ class _Check:
 
 def certificate_of(window: dict[str, Any], size: Sizes, arrival: ArrivalSet) -> WindowCertificate:
     """Read the certificate of an empty window from the kernel's memory, multipliers unscaled."""
+    return certificate_from(window, size, arrival, None, size.nw)
+
+
+def certificate_from(
+    window: dict[str, Any], size: Sizes, arrival: ArrivalSet, outputs: dict[int, Array] | None, nw: int
+) -> WindowCertificate:
+    """`certificate_of`, where the kernel may have other data than were given.
+
+    Parameters
+    ----------
+    outputs : dict of sample to (ny,) array, or None
+        Multipliers of the measurements, where those of the kernel's rows are not; stack, y and slack are then taken
+        from ``window["given.*"]`` and the noise is none.
+    nw : int
+        How many of the kernel's disturbances are the model's.
+    """
     base, time = int(window["clock"][BASE]), int(window["clock"][TIME])
     multiplier = window["farkas"] * window["scale"]
     nr = size.ny + size.nh + 2 * size.nq
+    prefix = "" if outputs is None else "given."
     samples = []
     for k in range(base, time + 1):
         s, v = k % (size.N + 1), k % (size.N + size.late)
@@ -371,17 +388,17 @@ def certificate_of(window: dict[str, Any], size: Sizes, arrival: ArrivalSet) -> 
         on_channel = rows[size.ny + size.nh :].reshape(size.nq, 2)
         samples.append(
             WindowSample(
-                stack=window["stack"][s].copy(),
+                stack=window[prefix + "stack"][s].copy(),
                 u=window["u"][s].copy(),
-                y=window["y"][s].copy(),
-                noise=window["noise"][s].copy(),
-                slack=window["slack"][s].copy(),
-                w_lower=window["w_lower"][v].copy(),
-                w_upper=window["w_upper"][v].copy(),
+                y=window[prefix + "y"][s].copy(),
+                noise=window["noise"][s].copy() if outputs is None else np.zeros(size.ny),
+                slack=window[prefix + "slack"][s].copy(),
+                w_lower=window["w_lower"][v][:nw].copy(),
+                w_upper=window["w_upper"][v][:nw].copy(),
                 s_lower=window["s_lower"][v].copy(),
                 s_upper=window["s_upper"][v].copy(),
                 lines=window["lines"][v].copy(),
-                on_output=rows[: size.ny],
+                on_output=rows[: size.ny] if outputs is None else outputs[k],
                 on_w=_with_bounds(rows[size.ny : size.ny + size.nh], window["w_rows_lower"], window["w_rows_upper"]),
                 on_channel=np.maximum(on_channel, 0.0),
             )
@@ -393,7 +410,7 @@ def certificate_of(window: dict[str, Any], size: Sizes, arrival: ArrivalSet) -> 
         late=bool(size.late),
         delta=window["delta"].copy(),
         owner=window["owner"].copy(),
-        w_rows=window["w_rows"].copy(),
+        w_rows=window["w_rows"][:, :nw].copy(),
         w_rows_lower=window["w_rows_lower"].copy(),
         w_rows_upper=window["w_rows_upper"].copy(),
         arrival=arrival,

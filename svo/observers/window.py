@@ -15,7 +15,9 @@ from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
 from svo.observers.fallback import candidates, is_feasible
+from svo.observers.output_injection import OutputInjection, can_inject
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
+from svo.observers.sign_split import SplitCertificate, SplitPrograms
 from svo.observers.step import VerdictName
 from svo.observers.window_setup import (
     channel_owners,
@@ -30,7 +32,6 @@ from svo.observers.window_step import WindowRecord, WindowStep
 Array = NDArray[np.float64]
 _GROWING_START = 16
 _LARGEST_BASIS = 128
-_ALL = 1 << 60  # programs: more than any task has
 _PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
 _ENTRY_ERRORS = {
     kernel.BAD_INPUT: "u is {u}; expected finite numbers",
@@ -61,12 +62,20 @@ class WindowObserver:
     eps : float
         Every measurement row is widened by eps (|y| + |C||x|max + |D u| + |c| + |F| wmax + n), for the rounding
         of the data.
+    sign_split : int
+        Largest number of cells, by the signs of s of its channels p = Delta s, that a program is split into where
+        the convex hull of p is not exact: with enough of them sets and verdicts of models of rank-one
+        uncertainties are exact for the window. 0 keeps the hull. Costs a solution from scratch a cell; steps with
+        a deadline keep the hull.
 
     Notes
     -----
     Guarantees. The true state stays inside `Step.set` and the verdict is never "falsified" while the plant
     keeps to the model; "falsified" comes with a `WindowCertificate` that was checked in exact arithmetic.
     After it the observer stays falsified until `reset`.
+
+    Where exact sensors read the disturbance (F square and invertible, no noise), w leaves the program at samples
+    with all sensors, by itself (`svo.observers.output_injection`).
     """
 
     def __init__(
@@ -76,6 +85,7 @@ class WindowObserver:
         horizon: int | None = 10,
         template: str | ArrayLike = "box",
         eps: float = 1e-9,
+        sign_split: int = 0,
     ) -> None:
         if not isinstance(model, UncertainModel):
             raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
@@ -83,7 +93,9 @@ class WindowObserver:
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        self._configure(model, horizon, template_rows(template, model.n_states), eps)
+        if not isinstance(sign_split, int | np.integer) or sign_split < 0:
+            raise ValueError(f"sign_split is {sign_split!r}; expected a number of cells >= 0 (0 = convex hulls)")
+        self._configure(model, horizon, template_rows(template, model.n_states), eps, int(sign_split))
         self.reset(initial)
 
     # -- the protocol ----------------------------------------------------------------------------
@@ -165,9 +177,60 @@ class WindowObserver:
         end = None if deadline is None else begun + deadline
         return self._sample(False, inputs, following, outputs, stack, noise, (w_lower, w_upper), begun, end)
 
+    def late_update(self, y: ArrayLike, sample: int) -> WindowStep:
+        """A measurement that arrives after its sample, while that sample is still in the window.
+
+        Its rows stand where they would have stood; the answer is about the newest sample, as that of the last
+        `step`, which it replaces. Alarms and their certificates, saved states and sets then include it.
+
+        Parameters
+        ----------
+        y : (ny,) array
+            Measured at ``sample``; NaN for the sensors that did not arrive now.
+        sample : int
+            Number of that sample (`WindowStep.sample` counts from 0), within `window`.
+
+        Raises
+        ------
+        ValueError
+            For a sample outside the window, a sensor that has been read there already, or a bad ``y``. The
+            observer is unchanged.
+        """
+        begun = perf_counter()
+        outputs = self._outputs(y)
+        if self._falsified is not None:
+            return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
+        first, last = self.window
+        if not (isinstance(sample, int | np.integer) and first <= sample <= last):
+            raise ValueError(f"sample is {sample!r}; expected one in the window, which holds {first} to {last}")
+        if np.isinf(outputs).any():
+            raise ValueError(_ENTRY_ERRORS[kernel.BAD_OUTPUT].format(y=y))
+        read = ~np.isnan(outputs) & ~np.isnan(self._arrays["y"][sample % (self._size.N + 1)])
+        if read.any():
+            raise ValueError(f"y has a value of sensor {int(np.argmax(read))}, which was already read at {sample}")
+        kernel.add_late(self._window, self._size, sample, outputs, self.eps)
+        if self._injection is not None:  # the sample was incomplete, so it is as it was given
+            s = sample % (self._size.N + 1)
+            self._arrays["given.y"][s], self._arrays["given.slack"][s] = self._arrays["y"][s], self._arrays["slack"][s]
+        verdict = self._solve(kernel.ARRIVAL)
+        return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """First and last sample that the window holds.
+
+        Raises
+        ------
+        ValueError
+            Before the first sample.
+        """
+        if not self._started:
+            raise ValueError("there is no sample yet; call update(y0), with NaN if there is no measurement")
+        return int(self._arrays["clock"][kernel.BASE]), self._time
+
     def state_dict(self) -> dict[str, Array]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
-        settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps])
+        settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps, self.sign_split])
         first = {f"initial.{f.name}": getattr(self._initial, f.name) for f in fields(self._initial)}
         last = dict(zip(("w_old_lower", "w_old_upper"), self._last_bounds or (), strict=False))
         falsified = np.array(float(self._falsified is not None))
@@ -185,10 +248,10 @@ class WindowObserver:
             If the state is not that of a window observer of such a model.
         """
         try:
-            horizon, steps, eps = (float(v) for v in state["settings"])
+            horizon, steps, eps, cells = (float(v) for v in state["settings"])
             initial = ArrivalSet(**{f.name: np.array(state[f"initial.{f.name}"]) for f in fields(ArrivalSet)})
             observer = cls.__new__(cls)
-            observer._configure(model, None if horizon < 0 else int(horizon), state["template"], eps)
+            observer._configure(model, None if horizon < 0 else int(horizon), state["template"], eps, int(cells))
             observer._begin(initial, int(steps))
             for name, array in observer._arrays.items():
                 array[...] = state[name]
@@ -197,7 +260,7 @@ class WindowObserver:
         if "w_old_lower" in state:
             observer._last_bounds = (np.array(state["w_old_lower"]), np.array(state["w_old_upper"]))
         if state["falsified"]:
-            observer._falsified = certificate_of(observer._arrays, observer._size, observer._arrival())
+            observer._prove_again()
         return observer
 
     def run(self, log: Log) -> WindowRecord:
@@ -233,6 +296,8 @@ class WindowObserver:
         schedule = self.model.schedule
         other.update(y, u, schedule)
         other.step(u, y, u, schedule).box  # noqa: B018
+        other.step(u, y, u, schedule, deadline=0.0)
+        other.late_update(y, 0)
         kernel.channel_factors(self.model.stack(schedule), self._owner)
         return perf_counter() - begun
 
@@ -251,14 +316,19 @@ class WindowObserver:
     def _started(self) -> bool:
         return bool(self._arrays["clock"][kernel.STARTED])
 
-    def _configure(self, model: UncertainModel, horizon: int | None, template: Array, eps: float) -> None:
+    def _configure(
+        self, model: UncertainModel, horizon: int | None, template: Array, eps: float, sign_split: int
+    ) -> None:
         self.model = model
+        self.sign_split = sign_split
         self.horizon = None if horizon is None else int(horizon)
         self.eps = float(eps)
         self._block = 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
         self._template = template
         self._owner = channel_owners(model)
         self._late = output_is_disturbed(model)
+        sizes = model.n_states, model.n_inputs, model.n_disturbances
+        self._injection = OutputInjection(*sizes) if can_inject(model) else None
         # Channels that the output may share are bounded at its sample, so what u says of them must be known then.
         driven = any(callable(u.B) or (u.B is not None and bool(np.any(u.B))) for u in model.uncertainties)
         self._wants_next_input = model.uses_input_in_output or (self._late and driven)
@@ -275,22 +345,23 @@ class WindowObserver:
         n, w = self.model.n_states, self._arrays
         w["h_lower"][:n], w["h_upper"][:n] = initial.box_lower, initial.box_upper
         kernel.initialise(self._window, self._size, initial.rows, initial.lower, initial.upper)
-        self._falsified: WindowCertificate | None = None
+        self._falsified: WindowCertificate | SplitCertificate | None = None
         self._last_bounds: tuple[Array, Array] | None = None
 
     def _allocate(self, steps: int) -> None:
         model, polytope = self.model, self.model.disturbance_polytope
+        n = model.n_states
+        nw = model.n_disturbances + (0 if self._injection is None else n)
         w_rows = (
             joint_rows(polytope)
             if polytope is not None
-            else (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0))
+            else (np.zeros((0, nw)), np.zeros(0), np.zeros(0))
         )
-        n = model.n_states
-        nv, nr = model.n_disturbances + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
+        nv, nr = nw + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
         na = max(len(self._template), len(self._initial.rows))
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
         self._size = kernel.Sizes(
-            n=n, nu=model.n_inputs, nw=model.n_disturbances, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
+            n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
             nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps, block=self._block,
             K=min(rows, columns, _LARGEST_BASIS) + 2, late=int(self._late),
         )  # fmt: skip
@@ -301,7 +372,9 @@ class WindowObserver:
         w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
         w["w_rows"][:], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
         w["jitter"][:] = jitter(w["jitter"].size)
-        self._window = kernel.new_window(w)
+        self._window = kernel.new_window(dict(w))
+        if self._injection is not None:
+            w |= self._injection.allocate(self._size)
 
     def _grow(self) -> None:
         """Twice the room; nothing has wrapped around yet, so every array is a leading block of the larger one."""
@@ -354,14 +427,80 @@ class WindowObserver:
         end: float | None = None,
     ) -> WindowStep:
         w_old = self._last_bounds or w
-        code = kernel.enter(self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
-        if code in _ENTRY_ERRORS:
-            raise ValueError(_ENTRY_ERRORS[code].format(u=u, y=y))
-        self._settle_channels(code == kernel.SIGN_OPEN)
-        kernel.complete(self._window, self._size, first, self.eps)
+        data = (self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
+        if end is None:
+            verdict = self._take(data)
+        else:
+            self._enter(data, end)
+            verdict = self._solve_until(end)
         self._last_bounds = w
-        verdict = self._solve(kernel.ARRIVAL) if end is None else self._solve_until(end)
         return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+
+    def _take(self, data: tuple[Any, ...]) -> VerdictName:
+        """One sample with all its programs, in one compiled call unless the window seems empty."""
+        if self.sign_split or self._injection is not None:
+            self._enter(data)
+            return self._solve(kernel.ARRIVAL)
+        code, verdict, program = kernel.take(*data, self.eps, kernel.PIVOT_LIMIT)
+        self._check_entry(code, data)
+        if verdict == kernel.CONSISTENT:
+            return "consistent"
+        return self._conclude(kernel.ARRIVAL, verdict, program)
+
+    def _enter(self, data: tuple[Any, ...], end: float | None = None) -> None:
+        """One sample without its programs, but for those of its channels, which stop at the time ``end``."""
+        injected, given = False, data
+        if self._injection is not None:
+            data, injected = self._inject(data)
+        code = kernel.enter(*data)
+        self._check_entry(code, given)
+        w, s = self._arrays, self._time % (self._size.N + 1)
+        if self._injection is not None:  # it is for outputs that w enters, where the clock has moved on by now
+            w["given.stack"][s], w["given.y"][s], w["given.injected"][s] = given[6], given[5], injected
+            w["given.slack"][s] = 0.0
+        if end is None:
+            self._settle_channels(code == kernel.SIGN_OPEN)
+        elif code == kernel.SIGN_OPEN:
+            v = self._time % (self._size.N + self._size.late)
+            for program in range(2 * self._size.nq):
+                if w["s_lower"][v, program // 2] < 0.0 < w["s_upper"][v, program // 2]:
+                    self._solve_in_portions(kernel.CHANNELS, program, end)
+        if injected:
+            self._widen(given)
+        kernel.complete(*data[:3], self.eps)
+        if self._injection is not None and not injected:
+            w["given.slack"][s] = w["slack"][s]
+
+    def _inject(self, data: tuple[Any, ...]) -> tuple[tuple[Any, ...], bool]:
+        """A sample's data with w injected where y is complete."""
+        assert self._injection is not None
+        *head, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper = data
+        stack, y, noise, injected = self._injection.transform(stack, y, (w_lower, w_upper))
+        none = np.zeros(self.model.n_states)
+        bounds = (np.concatenate([b, none]) for b in (w_old_lower, w_old_upper, w_lower, w_upper))
+        return (*head, y, stack, noise, *bounds), injected
+
+    def _widen(self, given: tuple[Any, ...]) -> None:
+        """Bounds of what the injection leaves to the state and to the box of w, by what is known of the state."""
+        assert self._injection is not None
+        u, y, stack, w = given[4], given[5], given[6], given[10:12]
+        s, v = self._time % (self._size.N + 1), self._time % (self._size.N + self._size.late)
+        arrays, nw = self._arrays, self.model.n_disturbances
+        d, widening, slack = self._injection.widths(stack, y, u, arrays["mag"][s], w, self.eps)
+        arrays["w_lower"][v, nw:], arrays["w_upper"][v, nw:] = -d, d
+        arrays["noise"][s] += widening
+        arrays["given.slack"][s] = slack
+
+    def _certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
+        """Of the multipliers at hand, about the model and the data as given."""
+        if self._injection is not None:
+            return self._injection.certificate(self._arrays, self._size, self._arrival(), objective)
+        return certificate_of(self._arrays, self._size, self._arrival())
+
+    @staticmethod
+    def _check_entry(code: int, data: tuple[Any, ...]) -> None:
+        if code in _ENTRY_ERRORS:
+            raise ValueError(_ENTRY_ERRORS[code].format(u=data[3], y=data[5]))
 
     def _settle_channels(self, sign_open: bool) -> None:
         """Tighten the bounds of those s whose sign is open."""
@@ -370,28 +509,54 @@ class WindowObserver:
 
     def _solve(self, task: int) -> VerdictName:
         """Solve the programs of a task; an empty window counts only once its certificate is proven."""
-        start = 0
-        while True:
-            verdict, program = kernel.solve(self._window, self._size, task, start, _ALL, kernel.PIVOT_LIMIT)
-            if verdict != kernel.EMPTY_CANDIDATE:
-                break
+        if self.sign_split and task != kernel.CHANNELS:
+            split = SplitPrograms(self._arrays, self._window, self._size, self._certificate, self.sign_split)
+            if split.is_needed:
+                return self._solve_split(split, task)
+        verdict, program = kernel.solve(self._window, self._size, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
+        return self._conclude(task, verdict, program)
+
+    def _conclude(self, task: int, verdict: int, program: int) -> VerdictName:
+        """What the programs of a task say; those after one that found the window empty have yet to be solved."""
+        while verdict == kernel.EMPTY_CANDIDATE:
             if task == kernel.ARRIVAL and self._prove():
                 return "falsified"
-            start = program + 1
+            after = program + 1
+            verdict, program = kernel.solve(self._window, self._size, task, after, kernel.ALL, kernel.PIVOT_LIMIT)
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
+
+    def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
+        """As `_solve`, each program over its cells."""
+        w, clock = self._arrays, self._arrays["clock"]
+        base, time = int(clock[kernel.BASE]), int(clock[kernel.TIME])
+        programs = {
+            kernel.ARRIVAL: range(*kernel.arrival_programs.py_func(self._size, base, time)),
+            kernel.NEWEST: range(2 * self._size.nt),
+            kernel.QUERY: range(1),
+        }[task]
+        prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
+        has_point = False
+        for program in programs:
+            sign = 1.0 - 2.0 * (program % 2)
+            target = w["answer"] if prefix is None else w[f"{prefix}_{'lower' if program % 2 else 'upper'}"]
+            at = 0 if prefix is None else program // 2
+            result = split.solve(task, program, lambda t=target, i=at, s=sign: float(s * t[i]))  # type: ignore[misc]
+            has_point = has_point or result.has_point
+            if result.proof is None:
+                target[at] = sign * result.value
+            elif task == kernel.ARRIVAL and result.proof.verify():
+                self._falsified = result.proof
+                return "falsified"
+        return "consistent" if has_point else "undecided"
 
     def _solve_until(self, end: float) -> VerdictName:
         """The arrival programs in small portions of pivots, until a time is reached."""
         clock, decided = self._arrays["clock"], False
         base, time = clock[kernel.BASE], clock[kernel.TIME]
         for program in range(*kernel.arrival_programs.py_func(self._size, base, time)):
-            verdict, late = kernel.UNDECIDED, False
-            while verdict == kernel.UNDECIDED and not late:
-                late = perf_counter() >= end
-                portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
-                verdict, _ = kernel.solve(self._window, self._size, kernel.ARRIVAL, program, program + 1, portion)
+            verdict = self._solve_in_portions(kernel.ARRIVAL, program, end)
             if verdict == kernel.EMPTY_CANDIDATE and self._prove():
                 return "falsified"
             decided = decided or verdict == kernel.CONSISTENT
@@ -399,12 +564,29 @@ class WindowObserver:
             clock[kernel.PENDING] = 1
         return "consistent" if decided else "undecided"
 
+    def _solve_in_portions(self, task: int, program: int, end: float) -> int:
+        """One program, its pivots in portions until it is decided or the time ``end`` is reached."""
+        verdict, late, done = kernel.UNDECIDED, False, 0
+        while verdict == kernel.UNDECIDED and not late:
+            late = perf_counter() >= end or done >= kernel.PIVOT_LIMIT
+            portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
+            verdict, _ = kernel.solve(self._window, self._size, task, program, program + 1, portion)
+            done += portion
+        return int(verdict)
+
     def _prove(self) -> bool:
         """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
-        certificate = certificate_of(self._arrays, self._size, self._arrival())
+        certificate = self._certificate()
         if certificate.verify():
             self._falsified = certificate
         return self._falsified is not None
+
+    def _prove_again(self) -> None:
+        """The proof of a falsification, from the window alone."""
+        if self.sign_split:
+            self._solve(kernel.ARRIVAL)
+        if self._falsified is None:
+            self._falsified = self._certificate()
 
     def _ask_highs(self) -> VerdictName:
         w = self._arrays

@@ -61,7 +61,10 @@ def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
         raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
     lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        raise ValueError("initial is unbounded; expected a bounded set of first states, such as a box")
+        raise ValueError(
+            "initial is unbounded; expected a bounded set of first states, such as a box as large as they can be: "
+            "the measurements shrink it"
+        )
     given = len(P.C) == 0 and np.isin(P.A, (-1.0, 0.0, 1.0)).all() and (np.count_nonzero(P.A, axis=1) == 1).all()
     room = 0.0 if given else 1e-12 * np.maximum(np.abs(lower), np.abs(upper))
     return lower - room, upper + room

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from svo.observers.proof import WindowCertificate
+from svo.observers.sign_split import SplitCertificate
 from svo.observers.step import VerdictName
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ class WindowStep:
     observer: _Window
     sample: int
     verdict: VerdictName
-    certificate: WindowCertificate | None
+    certificate: WindowCertificate | SplitCertificate | None
     seconds: float
 
     @property
@@ -84,4 +85,4 @@ class WindowRecord:
     lower: Array
     upper: Array
     seconds: Array
-    certificate: WindowCertificate | None
+    certificate: WindowCertificate | SplitCertificate | None

@@ -3,7 +3,7 @@
 memory        every array of a window, and its compiled type
 rows, channels, motion      the window's rows, its channels of uncertainty, and how it slides
 basis, ratio_test, dual_simplex      the bounded dual simplex
-programs, sample      what Python calls: the programs of a window, and one sample of data
+programs, sample, older_rows      what Python calls: the programs of a window, one sample of data, rows added later
 """
 
 from svo.observers.window_kernel.channels import channel_factors
@@ -24,7 +24,8 @@ from svo.observers.window_kernel.memory import (
     allocate,
     new_window,
 )
-from svo.observers.window_kernel.programs import ARRIVAL, CHANNELS, NEWEST, QUERY, arrival_programs, solve
+from svo.observers.window_kernel.older_rows import add_late, redraw_channel
+from svo.observers.window_kernel.programs import ALL, ARRIVAL, CHANNELS, NEWEST, QUERY, arrival_programs, solve
 from svo.observers.window_kernel.sample import (
     BAD_INPUT,
     BAD_MATRIX,
@@ -35,9 +36,11 @@ from svo.observers.window_kernel.sample import (
     complete,
     enter,
     initialise,
+    take,
 )
 
 __all__ = [
+    "ALL",
     "ARRIVAL",
     "BAD_INPUT",
     "BAD_MATRIX",
@@ -61,6 +64,7 @@ __all__ = [
     "TIME",
     "UNDECIDED",
     "Sizes",
+    "add_late",
     "allocate",
     "arrival_programs",
     "channel_factors",
@@ -68,5 +72,7 @@ __all__ = [
     "enter",
     "initialise",
     "new_window",
+    "redraw_channel",
     "solve",
+    "take",
 ]

@@ -131,7 +131,20 @@ def bound_channels(w, size, k):
 
 @njit(error_model="numpy")
 def open_channel(w, size, k, q):
-    """Variable p = Delta s of channel q at sample k: its box and, where s is not known, its two rows."""
+    """Variable p = Delta s of channel q at the newest sample k: its box and, where s is not known, its two rows."""
+    v = k % (size.N + size.late)
+    lo, hi = w.delta[q, 0], w.delta[q, 1]
+    low, high = w.s_lower[v, q], w.s_upper[v, q]
+    p_low = min(min(lo * low, lo * high), min(hi * low, hi * high))
+    p_high = max(max(lo * low, lo * high), max(hi * low, hi * high))
+    widen = 2.0 * UNIT * max(abs(p_low), abs(p_high))
+    w.vc[v, size.nw + q], w.vr[v, size.nw + q] = midpoint(p_low - widen, p_high + widen)
+    channel_rows(w, w.psi, size, k, q)
+
+
+@njit(error_model="numpy")
+def channel_rows(w, psi, size, k, q):
+    """The two rows of channel q at sample k over the present bounds of its s; psi as in `set_row`."""
     n, nu, nw = size.n, size.nu, size.nw
     nv, nr = nw + size.nq, size.ny + size.nh + 2 * size.nq
     s, v = k % (size.N + 1), k % (size.N + size.late)
@@ -142,12 +155,6 @@ def open_channel(w, size, k, q):
     for j in range(n):
         unknown = unknown or f[j] != 0.0
     _draw_lines(w, v, q)
-    lo, hi = w.delta[q, 0], w.delta[q, 1]
-    low, high = w.s_lower[v, q], w.s_upper[v, q]
-    p_low = min(min(lo * low, lo * high), min(hi * low, hi * high))
-    p_high = max(max(lo * low, lo * high), max(hi * low, hi * high))
-    widen = 2.0 * UNIT * max(abs(p_low), abs(p_high))
-    w.vc[v, nw + q], w.vr[v, nw + q] = midpoint(p_low - widen, p_high + widen)
     for side in range(2):
         i = size.na + s * nr + size.ny + size.nh + 2 * q + side
         clear_row(w, i)
@@ -165,7 +172,7 @@ def open_channel(w, size, k, q):
         w.G[i, first + nw + q] = sign * w.vr[v, nw + q]
         w.raw_upper[i] = bound
         w.row_c[i] = abs(intercept) + abs(slope) * magnitude + abs(w.vc[v, nw + q])
-        set_row(w, i, s, first, nv, w.vr[v, nw + q])
+        set_row(w, psi, i, s, first, nv, w.vr[v, nw + q])
 
 
 @njit(error_model="numpy")

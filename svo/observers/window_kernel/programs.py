@@ -22,6 +22,7 @@ from svo.observers.window_kernel.short_rows import copy, fill
 from svo.observers.window_kernel.sources import SOURCES
 
 ARRIVAL, NEWEST, CHANNELS, QUERY = range(4)
+ALL = 1 << 60  # programs: more than any task has
 
 
 @njit(error_model="numpy")
@@ -119,6 +120,59 @@ def arrival_programs(size, base, time):
     return first, min(first + share, 2 * size.nt)
 
 
+@njit(error_model="numpy")
+def solve_programs(w, size, task, start, stop, limit):
+    """See `solve`; for compiled callers."""
+    base, time = w.clock[BASE], w.clock[TIME]
+    verdict = UNDECIDED
+    basis, begin, count = 0, 0, 0
+    if task == ARRIVAL:
+        begin, count = arrival_programs(size, base, time)
+    elif task == NEWEST:
+        basis, count = 2 * size.nt, 2 * size.nt
+    elif task == CHANNELS:
+        basis, count = 4 * size.nt, 2 * size.nq
+    elif task == QUERY:
+        basis, count = 4 * size.nt + 2 * size.nq, 1
+    bounds_arrival = time - base > size.N - size.block
+    v = time % (size.N + size.late)
+    for program in range(max(begin, start), min(stop, count)):
+        i, side = program // 2, program % 2
+        sign = 1.0 - 2.0 * side
+        if task == CHANNELS and not (w.s_lower[v, i] < 0.0 < w.s_upper[v, i]):
+            continue
+        if task == NEWEST:
+            constant, rounding = _newest_cost(w, size, w.T[i], sign)
+        elif task == QUERY:
+            constant, rounding = _newest_cost(w, size, w.query, sign)
+        elif task == CHANNELS:
+            constant, rounding = _channel_cost(w, size, i, sign)
+        elif time > base:
+            constant, rounding = _arrival_cost(w, size, i, sign)
+        else:
+            fill(w.cost, 0.0)
+            w.cost[0] = 1.0
+            constant, rounding = 0.0, 0.0
+        outcome, value = maximise(w, size, basis + program, limit)
+        bound = constant + value + rounding + 4.0 * UNIT * (abs(constant) + abs(value))
+        if task == NEWEST:
+            _store_bound(w.now_lower, w.now_upper, i, side, bound)
+        elif task == QUERY:
+            w.answer[0] = bound
+        elif task == CHANNELS:
+            known = w.s_upper[v, i] if side == 0 else -w.s_lower[v, i]
+            _store_bound(w.s_lower[v], w.s_upper[v], i, side, min(bound, known))
+        elif bounds_arrival:
+            _store_bound(w.new_lower, w.new_upper, i, side, bound)
+        if outcome == EMPTY:  # its bound is stored all the same: the proof may not hold
+            return EMPTY_CANDIDATE, program
+        if outcome == OPTIMAL:
+            verdict = CONSISTENT
+    if task == ARRIVAL and time - base == size.N and stop >= count:
+        w.clock[PENDING] = 1
+    return verdict, -1
+
+
 def _compile_solve(sources):
     @njit(cache=True, error_model="numpy")
     def solve(w, size, task, start, stop, limit):
@@ -129,54 +183,7 @@ def _compile_solve(sources):
         that leave its sign open. Returns (verdict, program that found the window empty or -1).
         """
         sources  # noqa: B018 - in the closure, so part of the cache's key
-        base, time = w.clock[BASE], w.clock[TIME]
-        verdict = UNDECIDED
-        basis, begin, count = 0, 0, 0
-        if task == ARRIVAL:
-            begin, count = arrival_programs(size, base, time)
-        elif task == NEWEST:
-            basis, count = 2 * size.nt, 2 * size.nt
-        elif task == CHANNELS:
-            basis, count = 4 * size.nt, 2 * size.nq
-        elif task == QUERY:
-            basis, count = 4 * size.nt + 2 * size.nq, 1
-        bounds_arrival = time - base > size.N - size.block
-        v = time % (size.N + size.late)
-        for program in range(max(begin, start), min(stop, count)):
-            i, side = program // 2, program % 2
-            sign = 1.0 - 2.0 * side
-            if task == CHANNELS and not (w.s_lower[v, i] < 0.0 < w.s_upper[v, i]):
-                continue
-            if task == NEWEST:
-                constant, rounding = _newest_cost(w, size, w.T[i], sign)
-            elif task == QUERY:
-                constant, rounding = _newest_cost(w, size, w.query, sign)
-            elif task == CHANNELS:
-                constant, rounding = _channel_cost(w, size, i, sign)
-            elif time > base:
-                constant, rounding = _arrival_cost(w, size, i, sign)
-            else:
-                fill(w.cost, 0.0)
-                w.cost[0] = 1.0
-                constant, rounding = 0.0, 0.0
-            outcome, value = maximise(w, size, basis + program, limit)
-            bound = constant + value + rounding + 4.0 * UNIT * (abs(constant) + abs(value))
-            if task == NEWEST:
-                _store_bound(w.now_lower, w.now_upper, i, side, bound)
-            elif task == QUERY:
-                w.answer[0] = bound
-            elif task == CHANNELS:
-                known = w.s_upper[v, i] if side == 0 else -w.s_lower[v, i]
-                _store_bound(w.s_lower[v], w.s_upper[v], i, side, min(bound, known))
-            elif bounds_arrival:
-                _store_bound(w.new_lower, w.new_upper, i, side, bound)
-            if outcome == EMPTY:  # its bound is stored all the same: the proof may not hold
-                return EMPTY_CANDIDATE, program
-            if outcome == OPTIMAL:
-                verdict = CONSISTENT
-        if task == ARRIVAL and time - base == size.N and stop >= count:
-            w.clock[PENDING] = 1
-        return verdict, -1
+        return solve_programs(w, size, task, start, stop, limit)
 
     return solve
 

@@ -35,11 +35,11 @@ def collect_breakpoints(w, q, k, side):
 
 
 @njit(fastmath=FAST, error_model="numpy")
-def _swap(w, a, b):
-    w.candidate[a], w.candidate[b] = w.candidate[b], w.candidate[a]
-    w.ratio[a], w.ratio[b] = w.ratio[b], w.ratio[a]
-    w.pivot[a], w.pivot[b] = w.pivot[b], w.pivot[a]
-    w.drop[a], w.drop[b] = w.drop[b], w.drop[a]
+def _swap(candidate, ratio, pivot, drop, a, b):
+    candidate[a], candidate[b] = candidate[b], candidate[a]
+    ratio[a], ratio[b] = ratio[b], ratio[a]
+    pivot[a], pivot[b] = pivot[b], pivot[a]
+    drop[a], drop[b] = drop[b], drop[a]
 
 
 @njit(fastmath=FAST, error_model="numpy")
@@ -50,7 +50,7 @@ def choose_entering(w, m, violation):
     entering breakpoint); candidates [0, flips) flip and candidate[flips] enters. flips = -1: nothing stops the
     step, so the program is empty.
     """
-    drop, ratio, pivot = w.drop, w.ratio, w.pivot
+    candidate, drop, ratio, pivot = w.candidate, w.drop, w.ratio, w.pivot
     total = 0.0
     for j in range(m):
         total += drop[j]
@@ -69,12 +69,12 @@ def choose_entering(w, m, violation):
             if r < cut:
                 sum_below += drop[here]
                 if below != here:
-                    _swap(w, below, here)
+                    _swap(candidate, ratio, pivot, drop, below, here)
                 below += 1
                 here += 1
             elif r > cut:
                 above -= 1
-                _swap(w, here, above)
+                _swap(candidate, ratio, pivot, drop, here, above)
             else:
                 sum_equal += drop[here]
                 here += 1
@@ -97,7 +97,7 @@ def choose_entering(w, m, violation):
             if pivot[j] > pivot[big]:
                 big = j
         if big != first:
-            _swap(w, first, big)
+            _swap(candidate, ratio, pivot, drop, first, big)
         if drop[first] >= left:
             return first, max(left, 0.0)
         left -= drop[first]
@@ -110,7 +110,7 @@ def avoid_small_pivot(w, m, flips, left):
 
     The reduced costs that this leaves slightly infeasible are repaired by flips at the next pricing.
     """
-    pivot, ratio, drop = w.pivot, w.ratio, w.drop
+    candidate, pivot, ratio, drop = w.candidate, w.pivot, w.ratio, w.drop
     if pivot[flips] >= SMALL_PIVOT:
         return flips, left
     reach = ratio[flips] + 1e-9
@@ -119,7 +119,7 @@ def avoid_small_pivot(w, m, flips, left):
         if ratio[j] <= reach and pivot[j] > SMALL_PIVOT and (best < 0 or pivot[j] > pivot[best]):
             best = j
     if best >= 0:
-        _swap(w, flips, best)
+        _swap(candidate, ratio, pivot, drop, flips, best)
         return flips, left
     floor = ratio[flips] - 1e-9
     for j in range(flips):
@@ -127,6 +127,6 @@ def avoid_small_pivot(w, m, flips, left):
             best = j
     if best >= 0:
         left += drop[best]
-        _swap(w, best, flips - 1)
+        _swap(candidate, ratio, pivot, drop, best, flips - 1)
         return flips - 1, left
     return flips, left

@@ -53,11 +53,12 @@ def clear_row(w, i):
 
 
 @njit(error_model="numpy")
-def set_row(w, i, s, first, nv, floor):
-    """Finish row i of the sample in slot s: its own variables stand in G[i, first:first+nv] as coefficients of
-    the unscaled row; row_x, row_c and the raw bounds are set. Scales the row and eliminates the state."""
+def set_row(w, psi, i, s, first, nv, floor):
+    """Finish row i of the sample in slot s, whose state is psi z about its free response: the row's own variables
+    stand in G[i, first:first+nv] as coefficients of the unscaled row; row_x, row_c and the raw bounds are set.
+    Scales the row and eliminates the state."""
     g = w.G[i]
-    n, Z = w.psi.shape
+    n, Z = psi.shape
     w.row_v[i] = 0.0
     for j in range(first, first + nv):
         w.row_v[i] += abs(g[j])
@@ -77,7 +78,7 @@ def set_row(w, i, s, first, nv, floor):
         c = w.row_x[i, r]
         if c != 0.0:
             for j in range(Z):
-                g[j] += c * w.psi[r, j]
+                g[j] += c * psi[r, j]
     for j in range(Z):
         w.GT[j, i] = g[j]
     place_row(w, i, s)
@@ -85,45 +86,51 @@ def set_row(w, i, s, first, nv, floor):
 
 @njit(error_model="numpy")
 def measure(w, size, k, eps):
-    """Rows C x + D u + c + F w + channels within the noise about y(k), widened by the slack; NaN = missing."""
+    """The rows of all sensors at the newest sample k; NaN = missing."""
+    for o in range(size.ny):
+        measure_sensor(w, w.psi, size, k, o, eps)
+
+
+@njit(error_model="numpy")
+def measure_sensor(w, psi, size, k, o, eps):
+    """Row C x + D u + c + F w + channels within the noise about y(k), widened by the slack; psi as in `set_row`."""
     n, nu, nw, ny, nq = size.n, size.nu, size.nw, size.ny, size.nq
     nv, nr = nw + nq, ny + size.nh + 2 * nq
     s, v = k % (size.N + 1), k % (size.N + size.late)
     first = n + v * nv
     m = w.stack[s, 0]
-    for o in range(ny):
-        i = size.na + s * nr + o
-        clear_row(w, i)
-        y, noise = w.y[s, o], w.noise[s, o]
-        w.slack[s, o] = 0.0
-        if np.isnan(y):
-            continue
-        r = n + o
-        known, magnitude = m[r, n + nu], abs(m[r, n + nu]) + abs(y) + noise
-        for j in range(n):
-            w.row_x[i, j] = m[r, j]
-            magnitude += abs(m[r, j]) * w.mag[s, j]
-        for j in range(nu):
-            if m[r, n + j] != 0.0:
-                known += m[r, n + j] * w.u[s, j]
-                magnitude += abs(m[r, n + j] * w.u[s, j])
-        if size.late == 1:
-            for j in range(nw):
-                coefficient = m[r, n + nu + 1 + j]
-                w.G[i, first + j] = coefficient * w.vr[v, j]
-                known += coefficient * w.vc[v, j]
-                magnitude += abs(coefficient) * (abs(w.vc[v, j]) + w.vr[v, j])
-            for q in range(nq):
-                coefficient = w.gain[v, q, r]
-                w.G[i, first + nw + q] = coefficient * w.vr[v, nw + q]
-                known += coefficient * w.vc[v, nw + q]
-                magnitude += abs(coefficient) * (abs(w.vc[v, nw + q]) + w.vr[v, nw + q])
-        slack = eps * magnitude
-        w.slack[s, o] = slack
-        w.raw_lower[i] = y - known - noise - slack
-        w.raw_upper[i] = y - known + noise + slack
-        w.row_c[i] = magnitude
-        set_row(w, i, s, first, nv if size.late == 1 else 0, noise + slack)
+    i = size.na + s * nr + o
+    clear_row(w, i)
+    y, noise = w.y[s, o], w.noise[s, o]
+    w.slack[s, o] = 0.0
+    if np.isnan(y):
+        return
+    r = n + o
+    known, magnitude = m[r, n + nu], abs(m[r, n + nu]) + abs(y) + noise
+    for j in range(n):
+        w.row_x[i, j] = m[r, j]
+        magnitude += abs(m[r, j]) * w.mag[s, j]
+    for j in range(nu):
+        if m[r, n + j] != 0.0:
+            known += m[r, n + j] * w.u[s, j]
+            magnitude += abs(m[r, n + j] * w.u[s, j])
+    if size.late == 1:
+        for j in range(nw):
+            coefficient = m[r, n + nu + 1 + j]
+            w.G[i, first + j] = coefficient * w.vr[v, j]
+            known += coefficient * w.vc[v, j]
+            magnitude += abs(coefficient) * (abs(w.vc[v, j]) + w.vr[v, j])
+        for q in range(nq):
+            coefficient = w.gain[v, q, r]
+            w.G[i, first + nw + q] = coefficient * w.vr[v, nw + q]
+            known += coefficient * w.vc[v, nw + q]
+            magnitude += abs(coefficient) * (abs(w.vc[v, nw + q]) + w.vr[v, nw + q])
+    slack = eps * magnitude
+    w.slack[s, o] = slack
+    w.raw_lower[i] = y - known - noise - slack
+    w.raw_upper[i] = y - known + noise + slack
+    w.row_c[i] = magnitude
+    set_row(w, psi, i, s, first, nv if size.late == 1 else 0, noise + slack)
 
 
 @njit(error_model="numpy")

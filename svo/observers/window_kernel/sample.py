@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 
 from svo.observers.window_kernel.channels import bound_channels, factor_all, open_channel
-from svo.observers.window_kernel.memory import PENDING, STARTED, TIME
+from svo.observers.window_kernel.memory import PENDING, STARTED, TIME, UNDECIDED
 from svo.observers.window_kernel.motion import advance, anchor, slide
+from svo.observers.window_kernel.programs import ALL, ARRIVAL, CHANNELS, solve_programs
 from svo.observers.window_kernel.rows import clear_row, measure, midpoint, scale_arrival_row, set_row
 from svo.observers.window_kernel.short_rows import copy, fill
 from svo.observers.window_kernel.sources import SOURCES
@@ -69,9 +70,54 @@ def _open_slot(w, size, k):
             w.row_c[i] += abs(w.w_rows[h, j] * w.vc[v, j])
         w.raw_lower[i] = w.w_rows_lower[h] - shift
         w.raw_upper[i] = w.w_rows_upper[h] - shift
-        set_row(w, i, s, first, nv, 0.0)
+        set_row(w, w.psi, i, s, first, nv, 0.0)
     for q in range(nq):
         open_channel(w, size, k, q)
+
+
+@njit(error_model="numpy")
+def _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper):
+    error = _check_numbers(u, u_next, y, stack)
+    if error != FINE:
+        return error
+    if w.clock[PENDING] == 1:
+        slide(w, size)
+    k = w.clock[TIME]
+    new = k if first else k + 1
+    if not first:
+        copy(w.u[k % (size.N + 1)], u)
+    opened = new if size.late == 1 else k
+    if size.late == 1:
+        _store_sample(w, size, new, u_next, y, stack, noise)
+        _bound_disturbance(w, size, new, w_lower, w_upper)
+    elif not first:
+        _bound_disturbance(w, size, k, w_old_lower, w_old_upper)
+    v = opened % (size.N + size.late)
+    opens = size.late == 1 or not first
+    if opens and not factor_all(w.stack[opened % (size.N + 1)], w.owner, w.gain[v], w.functional[v]):
+        return RANK_ROSE
+    if size.late == 0:
+        _store_sample(w, size, new, u_next, y, stack, noise)
+    elif not first:
+        advance(w, size, k)
+        w.clock[TIME] = new
+    if size.late == 0 and first:
+        return FINE
+    return SIGN_OPEN if bound_channels(w, size, opened) else FINE
+
+
+@njit(error_model="numpy")
+def _complete(w, size, first, eps):
+    k = w.clock[TIME]
+    if size.late == 1:
+        _open_slot(w, size, k)
+    elif not first:
+        _open_slot(w, size, k)
+        advance(w, size, k)
+        k += 1
+        w.clock[TIME] = k
+    measure(w, size, k, eps)
+    w.clock[STARTED] = 1
 
 
 def _compile_enter(sources):
@@ -83,33 +129,7 @@ def _compile_enter(sources):
         Returns FINE, SIGN_OPEN (solve CHANNELS before `complete`), or an error that leaves the window as it was.
         """
         sources  # noqa: B018 - in the closure, so part of the cache's key
-        error = _check_numbers(u, u_next, y, stack)
-        if error != FINE:
-            return error
-        if w.clock[PENDING] == 1:
-            slide(w, size)
-        k = w.clock[TIME]
-        new = k if first else k + 1
-        if not first:
-            copy(w.u[k % (size.N + 1)], u)
-        opened = new if size.late == 1 else k
-        if size.late == 1:
-            _store_sample(w, size, new, u_next, y, stack, noise)
-            _bound_disturbance(w, size, new, w_lower, w_upper)
-        elif not first:
-            _bound_disturbance(w, size, k, w_old_lower, w_old_upper)
-        v = opened % (size.N + size.late)
-        opens = size.late == 1 or not first
-        if opens and not factor_all(w.stack[opened % (size.N + 1)], w.owner, w.gain[v], w.functional[v]):
-            return RANK_ROSE
-        if size.late == 0:
-            _store_sample(w, size, new, u_next, y, stack, noise)
-        elif not first:
-            advance(w, size, k)
-            w.clock[TIME] = new
-        if size.late == 0 and first:
-            return FINE
-        return SIGN_OPEN if bound_channels(w, size, opened) else FINE
+        return _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper)
 
     return enter
 
@@ -122,21 +142,38 @@ def _compile_complete(sources):
     def complete(w, size, first, eps):
         """Write the rows of the sample that `enter` took."""
         sources  # noqa: B018 - in the closure, so part of the cache's key
-        k = w.clock[TIME]
-        if size.late == 1:
-            _open_slot(w, size, k)
-        elif not first:
-            _open_slot(w, size, k)
-            advance(w, size, k)
-            k += 1
-            w.clock[TIME] = k
-        measure(w, size, k, eps)
-        w.clock[STARTED] = 1
+        _complete(w, size, first, eps)
 
     return complete
 
 
 complete = _compile_complete(SOURCES)
+
+
+def _compile_take(sources):
+    @njit(cache=True, error_model="numpy")
+    def take(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper, eps, limit):
+        """A whole sample in one call: `enter`, CHANNELS where a sign is open, `complete`, and the ARRIVAL programs.
+
+        Returns (what `enter` returns, verdict, program that found the window empty or -1).
+        """
+        sources  # noqa: B018 - in the closure, so part of the cache's key
+        code = _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper)
+        if code == SIGN_OPEN:
+            start = 0
+            while start >= 0:
+                _, program = solve_programs(w, size, CHANNELS, start, ALL, limit)
+                start = program + 1 if program >= 0 else -1
+        elif code != FINE:
+            return code, UNDECIDED, -1
+        _complete(w, size, first, eps)
+        verdict, program = solve_programs(w, size, ARRIVAL, 0, ALL, limit)
+        return code, verdict, program
+
+    return take
+
+
+take = _compile_take(SOURCES)
 
 
 def _compile_initialise(sources):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -197,6 +198,42 @@ def test_a_missed_deadline_widens_the_set_but_keeps_the_truth(seed: int) -> None
         room = 1e-12 * (1.0 + np.abs(log.x[k]))
         assert (lower - room <= log.x[k]).all()
         assert (log.x[k] <= upper + room).all()
+
+
+def test_a_deadline_holds_where_programs_run_into_their_limit_of_pivots() -> None:
+    """A plant whose programs cycle: without a deadline a sample takes many times as long (in CPU time)."""
+    rng = np.random.default_rng(51539)
+    horizon = int(rng.choice([1, 3, 5, 8, 10]))
+    model = random_plant(rng)
+    x0 = rng.uniform(-1.0, 1.0, model.n_states)
+    log = model.simulate(x0, rng.normal(size=(14, model.n_inputs)), rng)
+    assert log.x is not None
+    longest = []
+    for deadline in (None, 1e-3):
+        observer = WindowObserver(model, HPolytope.box(x0 - 1.0, x0 + 1.0), horizon=horizon)
+        observer.warm_up()
+        times = []
+        observer.update(log.y[0], log.u[0])
+        for k in range(1, len(log)):
+            begun = process_time()
+            step = observer.step(log.u[k - 1], log.y[k], log.u[k], deadline=deadline)
+            times.append(process_time() - begun)
+            assert step.verdict in ("consistent", "undecided")
+            lower, upper = step.box
+            room = 1e-9 * (1.0 + np.abs(log.x[k]))
+            assert (lower - room <= log.x[k]).all()
+            assert (log.x[k] <= upper + room).all()
+        longest.append(max(times))
+    assert longest[1] < 1e-3 + 5e-3
+    assert longest[0] > 2 * longest[1]
+
+
+def test_a_state_that_is_hardly_known_is_found_by_the_data() -> None:
+    """For an unbounded initial set, which is refused: a box as large as a state can be."""
+    model, log = flown(30)
+    boxes = [run_all(WindowObserver(model, HPolytope.box([-r, -r], [r, r])), log)[-1] for r in (1.0, 1e6)]
+    assert boxes[1][0] == "consistent"
+    np.testing.assert_allclose(boxes[0][1:], boxes[1][1:], atol=1e-4)
 
 
 def test_an_ample_deadline_changes_nothing() -> None:

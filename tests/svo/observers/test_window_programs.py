@@ -40,11 +40,15 @@ def test_supports_of_the_newest_state_are_optimal(seed: int) -> None:
     at = int(w["clock"][kernel.TIME]) % (observer._size.N + 1)
     for direction in rng.normal(size=(3, n)):
         w["query"][:] = direction
+        stops = int(w["clock"][kernel.STOPS])
         observer._solve(kernel.QUERY)
+        if w["clock"][kernel.STOPS] > stops:
+            continue  # at the limit of pivots: an outer bound, not the optimum
         cost = direction @ w["psi"]
         expected = float(direction @ w["phi"][at]) + highs(observer, cost)
         size = np.abs(cost).sum() + np.abs(direction) @ w["mag"][at]
-        assert expected - 1e-8 * size <= w["answer"][0] <= expected + 1e-7 * size
+        rounding = np.abs(direction) @ w["err"][at]  # of the state, bounded by powers of |A|
+        assert expected - 1e-8 * size <= w["answer"][0] <= expected + rounding + 1e-7 * size
 
 
 @pytest.mark.parametrize("limit", [0, 1, 5])

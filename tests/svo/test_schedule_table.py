@@ -1,0 +1,76 @@
+"""Tables over a schedule, alone, in models and under faults."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from svo import ScheduleTable, UncertainModel, Uncertainty
+from svo.faults import ActuatorFault, Step
+
+POINTS = np.array([0.0, 0.25, 1.0, 4.0])
+RNG = np.random.default_rng(0)
+A, B, C, MOMENT = (ScheduleTable(POINTS, RNG.normal(size=(4, *shape))) for shape in ((2, 2), (2, 1), (1, 2), (2, 2)))
+
+
+def model(wrap: Any = lambda table: table) -> UncertainModel:
+    items = [Uncertainty(A=wrap(MOMENT), bounds=(0.0, 1.0))]
+    return UncertainModel(wrap(A), wrap(B), wrap(C), a=[0.1, 1.0 / 3.0], n=[0.1], schedule=0.5, uncertainties=items)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(-1.0, 5.0))
+def test_entries_are_interpolated_linearly(at: float) -> None:
+    expected = [np.interp(at, POINTS, column) for column in A.values.reshape(4, -1).T]
+    np.testing.assert_allclose(A(at).ravel(), expected, atol=1e-14)
+
+
+def test_points_are_met_exactly() -> None:
+    for point, value in zip(POINTS, A.values, strict=True):
+        np.testing.assert_array_equal(A(point), value)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(-1.0, 5.0))
+def test_a_model_of_tables_is_the_model_of_their_functions(at: float) -> None:
+    one_by_one = model(lambda table: lambda schedule: table(schedule))
+    np.testing.assert_array_equal(model().stack(at), one_by_one.stack(at))
+
+
+@pytest.mark.parametrize("kind", ["loss", "hard-over"])
+def test_a_fault_of_tables_is_the_fault_of_their_functions(kind: Any) -> None:
+    fault = ActuatorFault(0, kind, 0.5, Step(0.0))
+    tables = fault.model(model())
+    functions = fault.model(model(lambda table: lambda schedule: table(schedule)))
+    assert isinstance(tables.uncertainties[-1].B, ScheduleTable)
+    for at in (-1.0, 0.1, 0.7, 3.3):
+        np.testing.assert_allclose(tables.stack(at), functions.stack(at), rtol=1e-14)
+
+
+def test_tables_over_other_points_are_evaluated_one_by_one() -> None:
+    other = ScheduleTable([0.0, 4.0], np.zeros((2, 1, 2)))
+    np.testing.assert_array_equal(model().replace(C=other).block("C", 1.5), other(1.5))
+
+
+@pytest.mark.parametrize(
+    ("points", "values", "message"),
+    [
+        ([0.0], [[1.0]], "points has shape"),
+        ([0.0, 0.0], [1.0, 2.0], "points has shape"),
+        ([0.0, 1.0], [1.0, 2.0, 3.0], r"values has shape \(3,\)"),
+        ([0.0, np.nan], [1.0, 2.0], "points has shape"),
+    ],
+)
+def test_bad_tables_are_named(points: Any, values: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        ScheduleTable(points, values)
+
+
+@pytest.mark.parametrize("schedule", [np.nan, np.inf])
+def test_a_schedule_that_is_no_number_is_refused(schedule: float) -> None:
+    with pytest.raises(ValueError, match="schedule is"):
+        A(schedule)
