@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from svo.calibration import Calibration, calibrate
     from svo.distinguish import Distinguishability, distinguishability
+    from svo.input_design import InputDesign, design_input
     from svo.isolation.architectures import ArchitectureI, ArchitectureII
     from svo.isolation.record import BankRecord, Verdict
     from svo.log import Log
@@ -24,6 +25,7 @@ __all__ = [
     "BankRecord",
     "Calibration",
     "Distinguishability",
+    "InputDesign",
     "Log",
     "PolytopeObserver",
     "UncertainModel",
@@ -31,6 +33,7 @@ __all__ = [
     "Verdict",
     "WindowObserver",
     "calibrate",
+    "design_input",
     "distinguishability",
 ]
 
@@ -40,6 +43,7 @@ _HOMES = {
     "BankRecord": "svo.isolation.record",
     "Calibration": "svo.calibration",
     "Distinguishability": "svo.distinguish",
+    "InputDesign": "svo.input_design",
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",
     "UncertainModel": "svo.model",
@@ -47,6 +51,7 @@ _HOMES = {
     "Verdict": "svo.isolation.record",
     "WindowObserver": "svo.observers.window",
     "calibrate": "svo.calibration",
+    "design_input": "svo.input_design",
     "distinguishability": "svo.distinguish",
 }
 

@@ -32,6 +32,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON 
 NoiseName = Annotated[
     str | None, typer.Option(metavar="NAME", help="Noise set: the bounds assumed. [default: the plant's first]")
 ]
+FlightSeed = Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")]
+FaultSize = Annotated[float, typer.Option(metavar="FRACTION", help="Size of the faults, of those the plant states.")]
 
 
 @app.command()
@@ -242,7 +244,8 @@ def distinguish(
     plant: PlantName,
     horizon: Annotated[int, typer.Option(min=1, help="Largest number of samples after the fault to search.")] = 100,
     noise: NoiseName = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")] = 0,
+    seed: FlightSeed = 0,
+    size: FaultSize = 1.0,
     as_json: AsJson = False,
 ) -> None:
     """Tell, without a study, which faults a plant's observers cannot mistake, and after how many samples.
@@ -267,11 +270,58 @@ def distinguish(
         check_noise(the_plant, noise)
         _announce(PREPARING)
         with progress("Pairs") as update:
-            answer = isolability(the_plant, noise, horizon, seed, progress=update)
+            answer = isolability(the_plant, noise, horizon, seed, progress=update, size=size)
         if as_json:
             print_json(answer.to_dict())
         else:
             print_isolability(answer)
+
+
+@app.command(name="design-input")
+def design_input(
+    plant: PlantName,
+    fault: Annotated[str, typer.Option(metavar="NAME", help="Fault to isolate.")],
+    horizon: Annotated[
+        int, typer.Option(min=1, help="Samples after the fault within which all other observers are falsified.")
+    ],
+    hold: Annotated[int, typer.Option(min=1, help="Samples over which the deviation is constant.")] = 1,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="COLUMN", help="Input that may deviate; may be repeated. [default: all]"),
+    ] = None,
+    noise: NoiseName = None,
+    seed: FlightSeed = 0,
+    size: FaultSize = 1.0,
+    out: Annotated[Path | None, typer.Option(metavar="INPUT.csv", help="CSV file of the designed inputs.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Design the input of (locally) least energy that isolates a fault for certain within a number of samples.
+
+    The input deviates from that of one simulated flight without a fault, within the plant's limits; what it makes
+    certain is checked as by `svo distinguish`. The exit code is 1 if no input was found.
+
+    \b
+    Example:
+      svo design-input eclipse --fault elevator --size 0.3 --horizon 10 --hold 5 --noise conservative
+    """
+    with _one_line_errors():
+        from svo.plant import load_plant
+        from svo.plant_input import plant_input
+        from svo.study.configuration import check_noise
+
+        the_plant = load_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        _announce(PREPARING)
+        found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
+        if as_json:
+            print_json(found.to_dict())
+        else:
+            typer.echo(found.to_text())
+        if found.design.u is not None and out is not None:
+            found.write(out)
+    if found.design.u is None:
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -5,13 +5,13 @@ noises that gives them a common output. That the separation be at least a margin
 and not convex; with its multipliers kept, the program's dual is affine in the inputs and, by weak duality, never above
 the separation. So the least energy under these affine rows is a quadratic program whose solution separates for certain
 and costs no more than the inputs that gave the multipliers. Repeated, this is the convex-concave procedure on the
-bilevel program (Scott et al. 2014, Automatica 50, section 5, solve it by integer programming instead): the energy
+bilevel program (which Scott et al., Automatica 50, 2014, solve by integer programming, for zonotopes): the energy
 falls from step to step towards a local optimum.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,9 +136,7 @@ def design_input(
     if u is None:
         return InputDesign(None, given, None, separation, ())
     checks = tuple(
-        distinguishability(
-            plant_model, model, horizon, initial=initial, observer_initial=start, u=u, schedule=schedule
-        )
+        distinguishability(plant_model, model, horizon, initial=initial, observer_initial=start, u=u, schedule=schedule)
         for model, start in zip(observers, sets, strict=True)
     )
     return InputDesign(u, given, search.energy(u), separation, checks)
@@ -218,7 +216,7 @@ class _Search:
         for _ in range(_ROUNDS):
             if at.separation >= self._margin:
                 break
-            after = self._accept(at, self._steepest(at), lambda new, old=at: new.separation > old.separation + 1e-6)
+            after = self._accept(at, self._steepest(at), at.separation + 1e-6)
             if after is None:
                 break
             at = after
@@ -228,17 +226,17 @@ class _Search:
         """Less energy under the affine bounds; the separation stays above the margin."""
         for _ in range(_ROUNDS):
             before = self.energy(at.u)
-            after = self._accept(at, self._cheapest(at), lambda new: new.separation >= self._margin * (1.0 - 1e-3))
+            after = self._accept(at, self._cheapest(at), self._margin * (1.0 - 1e-3))
             if after is None or self.energy(after.u) >= (1.0 - _DECREASE) * before:
                 break
             at = after
         return at
 
-    def _accept(self, at: _Support, target: Array, good: Callable[[_Support], bool]) -> _Support | None:
-        """The first good point on the way back from a target: rows may change where an s changes its sign."""
+    def _accept(self, at: _Support, target: Array, least: float) -> _Support | None:
+        """The first point on the way back from a target that separates so far: rows change where an s changes sign."""
         for k in range(_BACKTRACKS):
             new = self._support(at.u + 0.5**k * (target - at.u))
-            if good(new):
+            if new.separation >= least:
                 return new
         return None
 
@@ -274,7 +272,9 @@ class _Search:
         problem = cp.Problem(objective, [*rows, deviation >= self._lower_piece, deviation <= self._upper_piece])
         problem.solve(solver=cp.CLARABEL)
         if deviation.value is None:
-            raise RuntimeError(f"the program of the input design was left undecided ({problem.status}); scale the inputs")
+            raise RuntimeError(
+                f"cvxpy left a program of the input design undecided ({problem.status}); scale the inputs"
+            )
         inside = np.clip(deviation.value, self._lower_piece, self._upper_piece)
         return self._reference + self._pieces @ inside
 

@@ -119,9 +119,25 @@ class StatedFault:
 class StatesFaults(Protocol):
     """What a `Plant` offers besides if it can tell, before a study, which faults its bank can isolate."""
 
-    def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
-        """Each fault at the size of its first profile, with the bounds of a noise set."""
+    def stated_faults(self, noise: str, size: float = 1.0) -> Mapping[str, StatedFault]:
+        """Each fault at ``size`` times that of its first profile, with the bounds of a noise set.
+
+        A plant may leave ``size`` out; then only the full size can be asked for.
+        """
         ...
+
+
+@runtime_checkable
+class LimitsInputs(Protocol):
+    """What a `Plant` offers besides if inputs can be designed for it.
+
+    Attributes
+    ----------
+    input_limits : (lower, upper)
+        Bounds of the inputs, each (nu,), in the units of `Columns.inputs`.
+    """
+
+    input_limits: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def registered_plants() -> dict[str, Callable[[], Plant]]:

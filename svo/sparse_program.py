@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 
+from polytopes.silent_highs import new_highs
+
 Array = NDArray[np.float64]
 Columns = NDArray[np.int64]
 Terms = Sequence[tuple[Columns, Array]]
@@ -83,8 +85,8 @@ class SparseProgram:
         program.a_matrix_.value_ = matrix.data
         status = None
         for method, presolve in ((solver, "on"), ("simplex", "off")):  # thin programs leave one of them undecided
-            highs = highspy.Highs()
-            options: dict[str, Any] = {"output_flag": False, "threads": 1, "small_matrix_value": 1e-12}
+            highs = new_highs()
+            options: dict[str, Any] = {"threads": 1, "small_matrix_value": 1e-12}
             options |= {"solver": method, "presolve": presolve}
             options |= {f"{side}_feasibility_tolerance": FEASIBILITY for side in ("primal", "dual")}
             for option, value in options.items():

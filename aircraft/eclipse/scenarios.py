@@ -68,9 +68,16 @@ class Scenarios:
     ----------
     model : ScheduledModel
         Gives the surrogate, the derivatives, and the direction of the dynamics fault.
+    size : float
+        Of every fault, as a fraction of the paper's, in (0, 1].
     """
 
     model: ScheduledModel = field(default_factory=lambda: ScheduledModel(TS))
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.size <= 1.0:
+            raise ValueError(f"size is {self.size}; expected a fraction of the paper's faults, 0 < size <= 1")
 
     def fault(self, name: str, profile: str) -> Fault:
         """The fault object that both corrupts a flight and gives its observer's model.
@@ -84,11 +91,11 @@ class Scenarios:
             raise ValueError(f"profile is {profile!r}; expected one of {', '.join(PROFILES)}")
         shape = PROFILES[profile][0]
         if name == "alpha":
-            return SensorFault(ALPHA, "bias", ALPHA_BIAS[profile], shape)
+            return SensorFault(ALPHA, "bias", self.size * ALPHA_BIAS[profile], shape)
         if name == "elevator":
-            return ActuatorFault(ELEVATOR, "loss", 0.5, shape)
+            return ActuatorFault(ELEVATOR, "loss", self.size * 0.5, shape)
         if name == "dynamics":
-            return PlantFault(self.model.speed_moment, 1.0, shape)
+            return PlantFault(self.model.speed_moment, self.size * 1.0, shape)
         raise ValueError(f"fault is {name!r}; expected one of alpha, elevator, dynamics")
 
     def duration(self, fault: str, profile: str) -> float:
@@ -119,7 +126,8 @@ class Scenarios:
         start = level_trim(self.model.surrogate, DESIGN_AIRSPEED).x
         controller = _autopilot(noise, self.model.Ts, self.model.surrogate)
         superposed = None if excitation is None else self._from_fault(excitation, samples)
-        flight = fly(self.model.surrogate, controller, start, gusts, sensor_noise, corruption, self.model.Ts, superposed)
+        surrogate, Ts = self.model.surrogate, self.model.Ts
+        flight = fly(surrogate, controller, start, gusts, sensor_noise, corruption, Ts, superposed)
         airspeed = AirspeedFilter(self.model.Ts, DESIGN_AIRSPEED)
         schedule = np.array([airspeed(y) for y in flight.y])
         return Run(time, schedule, flight, sensor_noise, gusts, active)
