@@ -32,6 +32,10 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON 
 NoiseName = Annotated[
     str | None, typer.Option(metavar="NAME", help="Noise set: the bounds assumed. [default: the plant's first]")
 ]
+Architecture = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Architecture of the bank, such as I or II. [default: the plant's own]"),
+]
 FlightSeed = Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")]
 FaultSize = Annotated[float, typer.Option(metavar="FRACTION", help="Size of the faults, of those the plant states.")]
 
@@ -77,6 +81,12 @@ def study(
             metavar="NAME", help="Fault, or none for fault-free runs; may be repeated. [default: all and none]"
         ),
     ] = None,
+    architecture: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Architecture of the bank; several see the same runs. [default: the plant's own]"
+        ),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
     ] = False,
@@ -89,6 +99,7 @@ def study(
     \b
     Example:
       svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
+      svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
     """
     with _one_line_errors():
         _need_study_extra()
@@ -101,7 +112,7 @@ def study(
 
         the_plant = load_plant(plant)
         configuration = StudyConfiguration.for_plant(
-            the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or ()
+            the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
         )
         StudyFolder(out).check(configuration, resume)
         _announce(PREPARING)
@@ -167,6 +178,7 @@ def detect(
     ],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl and verdict.json.")] = None,
     noise: NoiseName = None,
+    architecture: Architecture = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a plant's isolation bank over a log, sample by sample, and say what it finds.
@@ -181,11 +193,11 @@ def detect(
         from svo.detect import detect as run_detection
         from svo.detect import write_detection
         from svo.log_file import read_log
-        from svo.plant import load_plant
+        from svo.plant import in_architecture, load_plant
         from svo.progress import progress
         from svo.study.configuration import check_noise
 
-        the_plant = load_plant(plant)
+        the_plant = in_architecture(load_plant(plant), architecture)
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)

@@ -45,7 +45,7 @@ def console() -> Console:
 
     terminal = Console(highlight=False)
     # A file has no width: a table in it need not be cut off.
-    return terminal if terminal.is_terminal else Console(highlight=False, width=130)
+    return terminal if terminal.is_terminal else Console(highlight=False, width=150)
 
 
 def print_json(value: Any) -> None:

@@ -94,6 +94,7 @@ class Eclipse:
     horizon: int = 10
     architecture: Literal["I", "II"] = "I"
     bounds: Mapping[str, Mapping[str, MismatchBounds]] = field(default_factory=read_bounds, repr=False)
+    architectures: tuple[str, ...] = ("I", "II")
     name: str = "eclipse"
     title: str = "Eclipse UAV, longitudinal axis: alpha sensor, elevator and M_u faults"
     Ts: float = TS
@@ -160,6 +161,10 @@ class Eclipse:
         if self.architecture == "II":
             return ArchitectureII(nominal, observers, global_=initial)
         return ArchitectureI(nominal, observers)
+
+    def with_architecture(self, architecture: Literal["I", "II"]) -> Eclipse:
+        """The same plant with the other bank."""
+        return replace(self, architecture=architecture)
 
     def scheduler(self) -> AirspeedFilter:
         """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""

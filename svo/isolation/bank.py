@@ -5,13 +5,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from inspect import signature
+from time import perf_counter
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.isolation.bank_state import restore_state, saved_state
 from svo.isolation.logic import NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
@@ -26,6 +29,22 @@ class Sample:
     y: ArrayLike
     u_next: ArrayLike | None
     schedule: Any
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """Those that are given, by name."""
+        given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule")}
+        try:
+            return {name: np.array(v, dtype=float) for name, v in given.items() if v is not None}
+        except (TypeError, ValueError) as error:
+            raise TypeError(f"schedule is {self.schedule!r}; only numbers and arrays of them can be saved") from error
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Sample:
+        """What `arrays` gave; numbers are numbers again."""
+        u, y, u_next, schedule = (arrays.get(name) for name in ("u", "y", "u_next", "schedule"))
+        if y is None:
+            raise ValueError("y is missing")
+        return cls(u, y, u_next, float(schedule) if schedule is not None and schedule.ndim == 0 else schedule)
 
 
 class Bank(ABC):
@@ -42,6 +61,7 @@ class Bank(ABC):
         self.names = logic.names
         self.observers: Mapping[str, Observer] = MappingProxyType(dict(observers))
         self._logic = logic
+        self._untimed = tuple(n for n, o in observers.items() if "deadline" not in signature(o.step).parameters)
         _check_observers(self.observers, same_states)
         self._forget()
 
@@ -61,19 +81,58 @@ class Bank(ABC):
         return self._conclude(0, steps, Sample(None, y0, u, schedule))
 
     def step(
-        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
+        self,
+        u: ArrayLike | None,
+        y: ArrayLike,
+        u_next: ArrayLike | None = None,
+        schedule: Any = None,
+        deadline: float | None = None,
     ) -> Verdict:
         """One transition driven by u, then the measurement y; arguments as for the observers.
+
+        Parameters
+        ----------
+        deadline : float, optional
+            Seconds for all observers together. They are stepped in the order of the bank, and each may take an equal
+            share of what is left; one that is done early leaves its time to those behind it. Sets may be wider and
+            verdicts "undecided" then, never wrong, and results depend on the machine's speed. Not cut short are the
+            exact proof of an alarm and, at the samples at which observers start again, their first programs.
 
         Raises
         ------
         ValueError
-            If there was no first measurement, or an observer refuses the arguments.
+            If there was no first measurement, an observer refuses the arguments, or a deadline is given to a bank
+            with an observer whose step has none.
         """
         if self._sample is None:
             raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
-        steps = {n: o.step(u, y, u_next=u_next, schedule=schedule) for n, o in self._running.items()}
+        if deadline is None:
+            steps = {n: o.step(u, y, u_next=u_next, schedule=schedule) for n, o in self._running.items()}
+        else:
+            steps = self._timed_steps(u, y, u_next, schedule, deadline)
         return self._conclude(self._sample + 1, steps, Sample(u, y, u_next, schedule))
+
+    def state_dict(self) -> dict[str, NDArray[Any]]:
+        """Everything that the next samples depend on, as named arrays without objects (for ``numpy.savez``).
+
+        Raises
+        ------
+        TypeError
+            If an observer has no ``state_dict``, or the schedule is no number or array of numbers.
+        """
+        return saved_state(self)
+
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on bit for bit from what `state_dict` gave; this bank must be built as that one was.
+
+        `observers` then holds new objects, made by the classes of the present ones for the same models.
+
+        Raises
+        ------
+        ValueError
+            If the state is that of a bank with other models or options, or is incomplete. The bank is unchanged.
+        """
+        restore_state(self, state)
 
     def reset(self, set: HPolytope) -> None:
         """Forget everything; all models are alive and the state at the next measurement lies in ``set``."""
@@ -108,12 +167,51 @@ class Bank(ABC):
     ) -> LogicState:
         """Start the observers that the logic asks for; ``steps`` may gain their answers."""
 
+    @abstractmethod
+    def _memory(self) -> dict[str, NDArray[np.float64]]:
+        """What an architecture keeps besides, as named arrays."""
+
+    @abstractmethod
+    def _recall(self, arrays: Mapping[str, NDArray[np.float64]]) -> None:
+        """Take back what `_memory` gave."""
+
     # -- inside ------------------------------------------------------------------------------------
+
+    def _timed_steps(
+        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any, deadline: float
+    ) -> dict[str, Step]:
+        end = perf_counter() + deadline
+        if not np.isfinite(deadline) or deadline <= 0:
+            raise ValueError(f"deadline is {deadline}; expected seconds > 0, or None")
+        for name in self._untimed:
+            raise ValueError(
+                f"deadline is given, but the step of observer {name!r} ({type(self.observers[name]).__name__}) has "
+                "none; leave the deadline out, or this observer"
+            )
+        steps: dict[str, Step] = {}
+        for left, (name, observer) in zip(range(len(self._running), 0, -1), self._running.items(), strict=True):
+            share = max(0.0, end - perf_counter()) / left
+            steps[name] = observer.step(u, y, u_next=u_next, schedule=schedule, deadline=share)
+        return steps
 
     def _forget(self) -> None:
         self._sample: int | None = None
         self._latest = Sample(None, self._nothing(), None, None)
         self._adopt(self._logic.initial())
+
+    def _resume(
+        self,
+        sample: int | None,
+        state: LogicState,
+        observers: Mapping[str, Observer],
+        arrays: Mapping[str, NDArray[np.float64]],
+    ) -> None:
+        """Go on from a saved state."""
+        latest = Sample.of_arrays(arrays)
+        self._recall(arrays)
+        self.observers = MappingProxyType(dict(observers))
+        self._sample, self._latest = sample, latest
+        self._adopt(state)
 
     def _adopt(self, state: LogicState) -> None:
         self._state = state
