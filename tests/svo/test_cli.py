@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from svo.cli import app
+from svo.study.store import StudyFolder
 
 
 def svo(*arguments: str | Path) -> Any:
@@ -214,3 +215,43 @@ def test_the_whole_chain_is_proven(log: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert all("proven from the first sample" in check["reason"] for check in json.loads(result.stdout))
     assert "leave --log out" in one_line(svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--log", log))
+
+
+def test_a_plant_with_one_bank_has_no_architectures(log: Path, tmp_path: Path) -> None:
+    for command in (["detect", "tank", log], ["study", "tank", "--out", tmp_path / "study"]):
+        message = one_line(svo(*command, "--architecture", "II"))
+        assert "plant 'tank' has one bank only (no with_architecture)" in message
+    unknown = svo("study", "eclipse", "--architecture", "III", "--out", tmp_path / "study")
+    assert "plant 'eclipse' has no architecture 'III'; it has I, II" in one_line(unknown)
+
+
+def test_both_architectures_see_the_same_runs_side_by_side(tmp_path: Path) -> None:
+    options = ["--runs", "1", "--workers", "1", "--noise", "quiet", "--fault", "elevator", "--fault", "none"]
+    out = tmp_path / "study"
+    result = svo("study", "eclipse", *options, "--architecture", "I", "--architecture", "II", "--out", out)
+    assert result.exit_code == 0, result.output
+    table = [line.split() for line in result.stdout.splitlines() if line.strip().startswith("elevator")]
+    assert [row[:3] for row in table] == [["elevator", p, a] for p in ("step", "hard", "soft") for a in ("I", "II")]
+    rows = StudyFolder(out).rows()
+    pairs = [(rows[i], rows[i + 1]) for i in range(0, len(rows), 2)]
+    assert all((a.seed, a.fault, a.profile) == (b.seed, b.fault, b.profile) for a, b in pairs)
+    assert {(a.architecture, b.architecture) for a, b in pairs} == {("I", "II")}
+    assert all(a.detection_delay_s == b.detection_delay_s for a, b in pairs)
+    assert not any(row.wrong_isolation or row.false_alarm for row in rows)
+    assert json.loads((out / "study.json").read_text())["configuration"]["architectures"] == ["I", "II"]
+    assert "--architecture I --architecture II" in (out / "report.html").read_text()
+    assert (out / "alive_quiet_II.png").exists()
+
+
+def test_the_chain_of_a_model_that_starts_late_is_proven_from_its_start(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    assert svo("simulate", "eclipse", "--fault", "elevator", "--seed", "3", "--out", log).exit_code == 0
+    result = svo("detect", "eclipse", log, "--architecture", "II", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
+    assert result.exit_code == 0, result.output
+    reasons = {check["observer"]: check["reason"] for check in json.loads(result.stdout)}
+    assert reasons.keys() == {"nominal", "alpha", "dynamics"}
+    assert "proven from the first sample" in reasons["nominal"]
+    assert "proven from its start at sample 51" in reasons["alpha"]
+    assert "given the global set" in reasons["alpha"]

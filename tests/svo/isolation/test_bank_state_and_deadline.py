@@ -191,5 +191,5 @@ def test_an_observer_without_a_deadline_is_refused_by_name() -> None:
 def test_a_deadline_is_a_positive_time(deadline: float) -> None:
     bank = first_bank(Step(START))
     bank.update([0.0, 0.0])
-    with pytest.raises(ValueError, match="deadline is .*; expected seconds > 0"):
+    with pytest.raises(ValueError, match=r"deadline is .*; expected seconds > 0"):
         bank.step([0.0], [0.0, 0.0], u_next=[0.0], deadline=deadline)
