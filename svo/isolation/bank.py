@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from inspect import signature
 from time import perf_counter
@@ -57,6 +57,8 @@ class Bank(ABC):
     observers : mapping of str to Observer
     """
 
+    _refused_by: str | None
+
     def __init__(self, logic: IsolationLogic, observers: Mapping[str, Observer], same_states: bool) -> None:
         self.names = logic.names
         self.observers: Mapping[str, Observer] = MappingProxyType(dict(observers))
@@ -77,7 +79,7 @@ class Bank(ABC):
         """
         if self._sample is not None:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        steps = {name: observer.update(y0, u=u, schedule=schedule) for name, observer in self._running.items()}
+        steps = self._ask(lambda observer: observer.update(y0, u=u, schedule=schedule))
         return self._conclude(0, steps, Sample(None, y0, u, schedule))
 
     def step(
@@ -101,13 +103,15 @@ class Bank(ABC):
         Raises
         ------
         ValueError
-            If there was no first measurement, an observer refuses the arguments, or a deadline is given to a bank
-            with an observer whose step has none.
+            If there was no first measurement, an observer refuses the arguments (its name leads the message), or a
+            deadline is given to a bank with an observer whose step has none. After a refusal by another than the
+            first observer, the ones before it have seen the sample: the bank then refuses further samples until
+            `reset` or `load_state_dict`.
         """
         if self._sample is None:
             raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
         if deadline is None:
-            steps = {n: o.step(u, y, u_next=u_next, schedule=schedule) for n, o in self._running.items()}
+            steps = self._ask(lambda observer: observer.step(u, y, u_next=u_next, schedule=schedule))
         else:
             steps = self._timed_steps(u, y, u_next, schedule, deadline)
         return self._conclude(self._sample + 1, steps, Sample(u, y, u_next, schedule))
@@ -204,14 +208,35 @@ class Bank(ABC):
                 f"deadline is given, but the step of observer {name!r} ({type(self.observers[name]).__name__}) has "
                 "none; leave the deadline out, or this observer"
             )
+        left = iter(range(len(self._running), 0, -1))
+
+        def timed(observer: Observer) -> Step:
+            share = max(0.0, end - perf_counter()) / next(left)
+            return observer.step(u, y, u_next=u_next, schedule=schedule, deadline=share)
+
+        return self._ask(timed)
+
+    def _ask(self, call: Callable[[Observer], Step]) -> dict[str, Step]:
+        """The answers of the running observers, in their order."""
+        if self._refused_by is not None:
+            raise ValueError(
+                f"observer {self._refused_by!r} refused a sample that others had already seen; call reset(set), or "
+                "load_state_dict(state) of the sample before"
+            )
         steps: dict[str, Step] = {}
-        for left, (name, observer) in zip(range(len(self._running), 0, -1), self._running.items(), strict=True):
-            share = max(0.0, end - perf_counter()) / left
-            steps[name] = observer.step(u, y, u_next=u_next, schedule=schedule, deadline=share)
+        for name, observer in self._running.items():
+            try:
+                steps[name] = call(observer)
+            except Exception as error:
+                self._refused_by = name if steps else None
+                if type(error) is ValueError:
+                    raise ValueError(f"observer {name!r}: {error}") from error
+                raise
         return steps
 
     def _forget(self) -> None:
         self._sample: int | None = None
+        self._refused_by = None
         self._latest = Sample(None, self._nothing(), None, None)
         self._adopt(self._logic.initial())
 
@@ -226,7 +251,7 @@ class Bank(ABC):
         latest = Sample.of_arrays(arrays)
         self._recall(arrays)
         self.observers = MappingProxyType(dict(observers))
-        self._sample, self._latest = sample, latest
+        self._sample, self._latest, self._refused_by = sample, latest, None
         self._adopt(state)
 
     def _adopt(self, state: LogicState) -> None:

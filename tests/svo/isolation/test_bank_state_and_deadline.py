@@ -12,7 +12,7 @@ import pytest
 
 from polytopes import HPolytope
 from svo import ArchitectureI, ArchitectureII, WindowObserver
-from svo.faults import Intermittent, Step, pairs
+from svo.faults import ActuatorFault, FaultPair, Intermittent, SensorFault, Step, pairs
 from svo.isolation.bank import Bank
 from svo.isolation.record import Verdict
 from svo.log import Log
@@ -193,3 +193,37 @@ def test_a_deadline_is_a_positive_time(deadline: float) -> None:
     bank.update([0.0, 0.0])
     with pytest.raises(ValueError, match=r"deadline is .*; expected seconds > 0"):
         bank.step([0.0], [0.0, 0.0], u_next=[0.0], deadline=deadline)
+
+
+# -- samples that an observer refuses ----------------------------------------------------------------------------
+
+
+def test_a_sample_that_is_refused_half_way_cannot_be_given_again_by_mistake() -> None:
+    # The pair of an actuator and a sensor fault needs u(k+1), the others do not.
+    nominal, faults = models(Step(START))
+    chosen = {"bias": faults["bias"].model(nominal), "both": FaultPair(loss(), scaling()).model(nominal)}
+    bank = ArchitectureI(WindowObserver(nominal, X0), {name: WindowObserver(m, X0) for name, m in chosen.items()})
+    bank.update([0.0, 0.0], u=[0.1])
+    before = bank.state_dict()
+    with pytest.raises(ValueError, match=r"observer 'both': u_next is missing; expected shape \(1,\)"):
+        bank.step([0.1], [0.0, 0.0])
+    with pytest.raises(ValueError, match="'both' refused a sample that others had already seen"):
+        bank.step([0.1], [0.0, 0.0], u_next=[0.1])
+    bank.load_state_dict(before)
+    assert bank.step([0.1], [0.0, 0.0], u_next=[0.1]).sample == 1
+
+
+def test_a_sample_that_the_first_observer_refuses_can_be_given_again() -> None:
+    bank = first_bank(Step(START))
+    bank.update([0.0, 0.0])
+    with pytest.raises(ValueError, match=r"observer 'nominal': y has shape \(3,\)"):
+        bank.step([0.0], [0.0, 0.0, 0.0])
+    assert bank.step([0.0], [0.0, 0.0]).sample == 1
+
+
+def loss() -> ActuatorFault:
+    return ActuatorFault(0, "loss", 0.7, Step(START))
+
+
+def scaling() -> SensorFault:
+    return SensorFault(0, "scaling", 0.2, Step(START))
