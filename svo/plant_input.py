@@ -86,7 +86,7 @@ class PlantInput:
             return "\n".join(lines)
         deviation = self.design.u - self.design.reference
         for i, name in enumerate(self.inputs):
-            low, high = deviation[:, i].min(), deviation[:, i].max()
+            low, high = (round(float(end), 6) for end in (deviation[:, i].min(), deviation[:, i].max()))
             if max(-low, high) > 1e-6 * np.abs(deviation).max():
                 lines.append(f"    {name}: between {low:+.4g} and {high:+.4g} beside the flight's own")
         lines.insert(0, f"Input of energy {self.design.energy:.4g} (squares of shares of the range) for: {head}.")
