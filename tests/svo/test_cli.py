@@ -258,3 +258,21 @@ def test_the_chain_of_a_model_that_starts_late_is_proven_from_its_start(register
     assert "proven from the first sample" in reasons["nominal"]
     assert "proven from its start at sample" in reasons["gauge"]
     assert "given the global set" in reasons["gauge"]
+
+
+def test_a_bound_that_is_not_proven_fails_the_chain(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from svo.observers.chain import ProvingObserver
+
+    honest = ProvingObserver._check_arrival
+
+    def check_after_cheating(self: ProvingObserver, program: int, target: int) -> None:
+        if program == 0:
+            self._arrays["new_upper"][0] -= 1e-9
+        honest(self, program, target)
+
+    assert svo("detect", "tank", log, "--out", tmp_path).exit_code == 0
+    monkeypatch.setattr(ProvingObserver, "_check_arrival", check_after_cheating)
+    result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
+    assert result.exit_code == 1
+    reasons = [check["reason"] for check in json.loads(result.stdout)]
+    assert all("bounds are not proven, first: arrival bound 0" in reason for reason in reasons)
