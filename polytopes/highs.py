@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.silent_highs import new_highs
+
 Floats = NDArray[np.float64]
 
 
@@ -48,9 +50,8 @@ class HighsProgram:
         program.a_matrix_.index_ = np.nonzero(A)[1].astype(np.int32)
         program.a_matrix_.value_ = A[A != 0]
         program.sense_ = highspy.ObjSense.kMaximize
-        self._highs = highspy.Highs()
+        self._highs = new_highs()
         for option, value in {
-            "output_flag": False,
             "threads": 1,
             "primal_feasibility_tolerance": 1e-10,
             "dual_feasibility_tolerance": 1e-10,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from svo.calibration import Calibration, calibrate
     from svo.distinguish import Distinguishability, distinguishability
+    from svo.input_design import InputDesign, design_input
     from svo.isolation.architectures import ArchitectureI, ArchitectureII
     from svo.isolation.record import BankRecord, Verdict
     from svo.log import Log
@@ -27,6 +28,7 @@ __all__ = [
     "Calibration",
     "ConstrainedZonotopeObserver",
     "Distinguishability",
+    "InputDesign",
     "Log",
     "PolytopeObserver",
     "ScheduleTable",
@@ -35,6 +37,7 @@ __all__ = [
     "Verdict",
     "WindowObserver",
     "calibrate",
+    "design_input",
     "distinguishability",
 ]
 
@@ -45,6 +48,7 @@ _HOMES = {
     "Calibration": "svo.calibration",
     "ConstrainedZonotopeObserver": "svo.observers.zonotope",
     "Distinguishability": "svo.distinguish",
+    "InputDesign": "svo.input_design",
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",
     "ScheduleTable": "svo.schedule_table",
@@ -53,6 +57,7 @@ _HOMES = {
     "Verdict": "svo.isolation.record",
     "WindowObserver": "svo.observers.window",
     "calibrate": "svo.calibration",
+    "design_input": "svo.input_design",
     "distinguishability": "svo.distinguish",
 }
 

@@ -32,6 +32,12 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON 
 NoiseName = Annotated[
     str | None, typer.Option(metavar="NAME", help="Noise set: the bounds assumed. [default: the plant's first]")
 ]
+Architecture = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Architecture of the bank, such as I or II. [default: the plant's own]"),
+]
+FlightSeed = Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")]
+FaultSize = Annotated[float, typer.Option(metavar="FRACTION", help="Size of the faults, of those the plant states.")]
 
 
 @app.command()
@@ -79,6 +85,12 @@ def study(
         str | None,
         typer.Option(metavar="ADDRESS", help="Run on the dask.distributed cluster of this scheduler instead."),
     ] = None,
+    architecture: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Architecture of the bank; several see the same runs. [default: the plant's own]"
+        ),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
     ] = False,
@@ -91,6 +103,7 @@ def study(
     \b
     Example:
       svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
+      svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
     """
     with _one_line_errors():
         _need_study_extra()
@@ -103,7 +116,7 @@ def study(
 
         the_plant = load_plant(plant)
         configuration = StudyConfiguration.for_plant(
-            the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or ()
+            the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
         )
         StudyFolder(out).check(configuration, resume)
         _announce(PREPARING)
@@ -171,6 +184,7 @@ def detect(
     ],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl and verdict.json.")] = None,
     noise: NoiseName = None,
+    architecture: Architecture = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a plant's isolation bank over a log, sample by sample, and say what it finds.
@@ -185,11 +199,11 @@ def detect(
         from svo.detect import detect as run_detection
         from svo.detect import write_detection
         from svo.log_file import read_log
-        from svo.plant import load_plant
+        from svo.plant import in_architecture, load_plant
         from svo.progress import progress
         from svo.study.configuration import check_noise
 
-        the_plant = load_plant(plant)
+        the_plant = in_architecture(load_plant(plant), architecture)
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
@@ -248,7 +262,8 @@ def distinguish(
     plant: PlantName,
     horizon: Annotated[int, typer.Option(min=1, help="Largest number of samples after the fault to search.")] = 100,
     noise: NoiseName = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")] = 0,
+    seed: FlightSeed = 0,
+    size: FaultSize = 1.0,
     as_json: AsJson = False,
 ) -> None:
     """Tell, without a study, which faults a plant's observers cannot mistake, and after how many samples.
@@ -273,11 +288,58 @@ def distinguish(
         check_noise(the_plant, noise)
         _announce(PREPARING)
         with progress("Pairs") as update:
-            answer = isolability(the_plant, noise, horizon, seed, progress=update)
+            answer = isolability(the_plant, noise, horizon, seed, progress=update, size=size)
         if as_json:
             print_json(answer.to_dict())
         else:
             print_isolability(answer)
+
+
+@app.command(name="design-input")
+def design_input(
+    plant: PlantName,
+    fault: Annotated[str, typer.Option(metavar="NAME", help="Fault to isolate.")],
+    horizon: Annotated[
+        int, typer.Option(min=1, help="Samples after the fault within which all other observers are falsified.")
+    ],
+    hold: Annotated[int, typer.Option(min=1, help="Samples over which the deviation is constant.")] = 1,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="COLUMN", help="Input that may deviate; may be repeated. [default: all]"),
+    ] = None,
+    noise: NoiseName = None,
+    seed: FlightSeed = 0,
+    size: FaultSize = 1.0,
+    out: Annotated[Path | None, typer.Option(metavar="INPUT.csv", help="CSV file of the designed inputs.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Design the input of (locally) least energy that isolates a fault for certain within a number of samples.
+
+    The input deviates from that of one simulated flight without a fault, within the plant's limits; what it makes
+    certain is checked as by `svo distinguish`. The exit code is 1 if no input was found.
+
+    \b
+    Example:
+      svo design-input eclipse --fault elevator --size 0.3 --horizon 10 --hold 5 --noise conservative
+    """
+    with _one_line_errors():
+        from svo.plant import load_plant
+        from svo.plant_input import plant_input
+        from svo.study.configuration import check_noise
+
+        the_plant = load_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        _announce(PREPARING)
+        found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
+        if as_json:
+            print_json(found.to_dict())
+        else:
+            typer.echo(found.to_text())
+        if found.design.u is not None and out is not None:
+            found.write(out)
+    if found.design.u is None:
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from svo.study.summary import ConditionSummary
 
 
+_SHOWN = 20  # failed checks
+
+
 def describe(plant: Plant) -> dict[str, Any]:
     """A plant as plain data, for JSON."""
     columns = plant.columns
@@ -45,7 +48,7 @@ def console() -> Console:
 
     terminal = Console(highlight=False)
     # A file has no width: a table in it need not be cut off.
-    return terminal if terminal.is_terminal else Console(highlight=False, width=130)
+    return terminal if terminal.is_terminal else Console(highlight=False, width=150)
 
 
 def print_json(value: Any) -> None:
@@ -110,9 +113,11 @@ def print_isolability(answer: Isolability) -> None:
 def print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:
     """Alarms that failed, one a line on standard error, and how many were proven."""
     failed = [check for check in checks if not check.ok]
-    for check in failed:
+    for check in failed[:_SHOWN]:
         whose = f" ({check.observer}, sample {check.sample})" if check.sample >= 0 else ""
         typer.echo(f"{path}, line {check.line}{whose}: {check.reason}", err=True)
+    if len(failed) > _SHOWN:
+        typer.echo(f"{path}: {len(failed) - _SHOWN} more that failed (--json lists all)", err=True)
     seconds = sum(check.seconds for check in checks)
     typer.echo(
         f"{path}: {len(checks) - len(failed)} of {len(checks)} alarms proven in exact arithmetic, in {seconds:.2f} s"

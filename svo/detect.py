@@ -15,7 +15,7 @@ from svo.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
-from svo.plant import Plant
+from svo.plant import Plant, architecture_of
 
 Scheduler = Callable[[NDArray[np.float64]], Any]
 
@@ -126,7 +126,7 @@ def detect(
         if progress is not None:
             progress(verdict.sample + 1, len(log))
     record = recorder.record()
-    origin = {"plant": plant.name, "noise": noise, **(source or {})}
+    origin = {**source_of_bank(plant), "noise": noise, **(source or {})}
     return Detection(plant.name, noise, log.time, record, alarms_of(record, log, origin))
 
 
@@ -134,6 +134,12 @@ def alarms_of(record: BankRecord, log: Log, source: Mapping[str, str | int | flo
     """Every certified falsification of a record, in order of time."""
     died = sorted((sample, name) for name, sample in record.died_at.items() if sample is not None)
     return tuple(Alarm(name, k, float(log.time[k]), record.certificates[name], source) for k, name in died)
+
+
+def source_of_bank(plant: Plant) -> dict[str, str]:
+    """Which bank an alarm comes from, as stored with it: the plant and, if it offers a choice, the architecture."""
+    architecture = architecture_of(plant)
+    return {"plant": plant.name} | ({} if architecture is None else {"architecture": architecture})
 
 
 def write_detection(folder: Path, detection: Detection) -> None:

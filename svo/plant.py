@@ -119,9 +119,69 @@ class StatedFault:
 class StatesFaults(Protocol):
     """What a `Plant` offers besides if it can tell, before a study, which faults its bank can isolate."""
 
-    def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
-        """Each fault at the size of its first profile, with the bounds of a noise set."""
+    def stated_faults(self, noise: str, size: float = 1.0) -> Mapping[str, StatedFault]:
+        """Each fault at ``size`` times that of its first profile, with the bounds of a noise set.
+
+        A plant may leave ``size`` out; then only the full size can be asked for.
+        """
         ...
+
+
+@runtime_checkable
+class LimitsInputs(Protocol):
+    """What a `Plant` offers besides if inputs can be designed for it.
+
+    Attributes
+    ----------
+    input_limits : (lower, upper)
+        Bounds of the inputs, each (nu,), in the units of `Columns.inputs`.
+    """
+
+    input_limits: tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+@runtime_checkable
+class OffersArchitectures(Protocol):
+    """What a `Plant` offers besides if its bank can be built in more than one way.
+
+    Attributes
+    ----------
+    architecture : str
+        Of the plant's own `bank`.
+    architectures : tuple of str
+        All that there are.
+    """
+
+    architecture: str
+    architectures: tuple[str, ...]
+
+    def with_architecture(self, architecture: str) -> Plant:
+        """The same plant with the bank of another architecture."""
+        ...
+
+
+def architecture_of(plant: Plant) -> str | None:
+    """The architecture of a plant's bank; None if the plant has one kind of bank only."""
+    return plant.architecture if isinstance(plant, OffersArchitectures) else None
+
+
+def in_architecture(plant: Plant, architecture: str | None) -> Plant:
+    """The plant with the bank of an architecture; None = with its own.
+
+    Raises
+    ------
+    ValueError
+        If the plant offers no choice, or not this one.
+    """
+    if architecture is None:
+        return plant
+    if not isinstance(plant, OffersArchitectures):
+        raise ValueError(f"plant {plant.name!r} has one bank only (no with_architecture); leave the architecture out")
+    if architecture not in plant.architectures:
+        raise ValueError(
+            f"plant {plant.name!r} has no architecture {architecture!r}; it has {', '.join(plant.architectures)}"
+        )
+    return plant.with_architecture(architecture)
 
 
 def registered_plants() -> dict[str, Callable[[], Plant]]:

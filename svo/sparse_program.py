@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 
+from polytopes.silent_highs import new_highs
+
 Array = NDArray[np.float64]
 Columns = NDArray[np.int64]
 Terms = Sequence[tuple[Columns, Array]]
@@ -83,8 +85,8 @@ class SparseProgram:
         program.a_matrix_.value_ = matrix.data
         status = None
         for method, presolve in ((solver, "on"), ("simplex", "off")):  # thin programs leave one of them undecided
-            highs = highspy.Highs()
-            options: dict[str, Any] = {"output_flag": False, "threads": 1, "small_matrix_value": 1e-12}
+            highs = new_highs()
+            options: dict[str, Any] = {"threads": 1, "small_matrix_value": 1e-12}
             options |= {"solver": method, "presolve": presolve}
             options |= {f"{side}_feasibility_tolerance": FEASIBILITY for side in ("primal", "dual")}
             for option, value in options.items():
@@ -104,10 +106,20 @@ class SparseProgram:
         """A lower bound of every point's cost, whatever the multipliers (rows,): weak duality over the bounds."""
         row_lower, row_upper = self._row_bounds()
         lower, upper = self._column_bounds(for_solver=False)
-        up = np.where(np.isfinite(row_lower), np.maximum(multipliers, 0.0), 0.0)
-        down = np.where(np.isfinite(row_upper), np.minimum(multipliers, 0.0), 0.0)
-        reduced = cost - self._matrix().T @ (up + down)
+        up, down = self._usable(multipliers)
+        reduced = self.reduced_costs(cost, multipliers)
         return _least(up, row_lower, row_upper) + _least(down, row_lower, row_upper) + _least(reduced, lower, upper)
+
+    def reduced_costs(self, cost: Array, multipliers: Array) -> Array:
+        """What each column (columns,) adds to the weak dual bound per unit of its value."""
+        up, down = self._usable(multipliers)
+        return cost - self._matrix().T @ (up + down)
+
+    def _usable(self, multipliers: Array) -> tuple[Array, Array]:
+        """Multipliers of lower and of upper bounds of the rows, without those of infinite ones."""
+        row_lower, row_upper = self._row_bounds()
+        up = np.where(np.isfinite(row_lower), np.maximum(multipliers, 0.0), 0.0)
+        return up, np.where(np.isfinite(row_upper), np.minimum(multipliers, 0.0), 0.0)
 
     def _matrix(self) -> csr_matrix:
         i, j, values = (np.concatenate(parts) for parts in zip(*self._entries, strict=True))

@@ -57,12 +57,12 @@ def mismatch(run: Run, scenarios: Scenarios) -> Mismatch:
     return Mismatch(x[1:] - predicted[:-1], true_output - _apply(blocks["C"], x) - blocks["c"])
 
 
-def largest(scenarios: Scenarios, fault: str, noise: str, runs: int) -> MismatchBounds:
+def largest(scenarios: Scenarios, fault: str, noise: str, runs: int, excitation: Array | None = None) -> MismatchBounds:
     """The largest mismatch seen over ``runs`` flights of each profile of a fault (or fault-free)."""
     state, output = np.zeros(4), np.zeros(4)
     for seed in seeds(noise, fault, runs):
         for profile in PROFILES if fault != HEALTHY else ("",):
-            seen = mismatch(scenarios.run(fault, profile, noise, seed), scenarios)
+            seen = mismatch(scenarios.run(fault, profile, noise, seed, excitation), scenarios)
             state = np.maximum(state, np.abs(seen.state).max(axis=0))
             output = np.maximum(output, np.abs(seen.output).max(axis=0))
     return MismatchBounds(state, output)
@@ -70,15 +70,20 @@ def largest(scenarios: Scenarios, fault: str, noise: str, runs: int) -> Mismatch
 
 def measure(scenarios: Scenarios, runs: int) -> dict[str, dict[str, MismatchBounds]]:
     """Bounds for every noise set and observer; a fault's observer also covers fault-free flight."""
-    result: dict[str, dict[str, MismatchBounds]] = {}
-    for noise in NOISE_SETS:
-        seen = largest(scenarios, HEALTHY, noise, runs)
-        healthy = MismatchBounds(HEALTHY_MARGIN * seen.state, HEALTHY_MARGIN * seen.output)
-        result[noise] = {"nominal": healthy}
-        for fault in FAULTS:
-            seen = largest(scenarios, fault, noise, runs)
-            state = np.maximum(MARGIN * seen.state, healthy.state)
-            result[noise][fault] = MismatchBounds(state, np.maximum(MARGIN * seen.output, healthy.output))
+    return {noise: measure_one(scenarios, noise, runs) for noise in NOISE_SETS}
+
+
+def measure_one(
+    scenarios: Scenarios, noise: str, runs: int, excitation: Array | None = None
+) -> dict[str, MismatchBounds]:
+    """Bounds for one noise set, of flights with an input superposed on the autopilot's (`Scenarios.run`), if any."""
+    seen = largest(scenarios, HEALTHY, noise, runs, excitation)
+    healthy = MismatchBounds(HEALTHY_MARGIN * seen.state, HEALTHY_MARGIN * seen.output)
+    result = {"nominal": healthy}
+    for fault in FAULTS:
+        seen = largest(scenarios, fault, noise, runs, excitation)
+        state = np.maximum(MARGIN * seen.state, healthy.state)
+        result[fault] = MismatchBounds(state, np.maximum(MARGIN * seen.output, healthy.output))
     return result
 
 

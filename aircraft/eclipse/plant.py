@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.eclipse.autopilot import DESIGN_AIRSPEED
-from aircraft.eclipse.models import ScheduledModel, read_bounds
+from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, INPUT_LOWER, INPUT_UPPER
+from aircraft.eclipse.models import MismatchBounds, ScheduledModel, read_bounds
 from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS, Scenarios
 from aircraft.eclipse.schedule import AirspeedFilter
@@ -62,13 +62,13 @@ INITIAL_LOWER = (15.0, -15.0, -0.8, -2.0)
 INITIAL_UPPER = (65.0, 25.0, 0.8, 2.0)
 
 
-STATED: Mapping[str, str] = MappingProxyType(
-    {
-        "alpha": "alpha reads 3 deg too much",
-        "elevator": "half of the elevator's effect is lost",
-        "dynamics": "M_u is 30 % larger",
-    }
-)
+def _description(fault: str, size: float) -> str:
+    """The step of a fault at a fraction of its size, for people."""
+    return {
+        "alpha": f"alpha reads {3 * size:g} deg too much",
+        "elevator": f"{50 * size:g} % of the elevator's effect is lost",
+        "dynamics": f"M_u is {30 * size:g} % larger",
+    }[fault]
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,15 @@ class Eclipse:
     architecture : {"I", "II"}
         Of the bank. Under Architecture II the fault observers start, at the detection, from the set of all
         states of a flight between 25 and 55 m/s.
+    bounds : mapping of noise set to mapping of observer to MismatchBounds
+        What the observers' models leave out; by default as measured on the flights of ``scenarios``.
     """
 
     scenarios: Scenarios = field(default_factory=Scenarios)
     horizon: int = 10
     architecture: Literal["I", "II"] = "I"
+    bounds: Mapping[str, Mapping[str, MismatchBounds]] = field(default_factory=read_bounds, repr=False)
+    architectures: tuple[str, ...] = ("I", "II")
     name: str = "eclipse"
     title: str = "Eclipse UAV, longitudinal axis: alpha sensor, elevator and M_u faults"
     Ts: float = TS
@@ -98,6 +102,7 @@ class Eclipse:
     faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: {name: tuple(PROFILES) for name in FAULTS})
     noise_sets: tuple[str, ...] = tuple(NOISE_SETS)
     columns: Columns = COLUMNS
+    input_limits: tuple[Array, Array] = field(default_factory=lambda: (INPUT_LOWER, INPUT_UPPER))
     reference: Mapping[tuple[str, str], Reference] = field(default_factory=lambda: REFERENCE)
     reference_title: str = (
         "Rosa and Silvestre, Control Engineering Practice 21 (2013), section 6: "
@@ -121,28 +126,31 @@ class Eclipse:
         """The observers' models: "nominal", then one for each fault, which contains the healthy aircraft."""
         if noise not in NOISE_SETS:
             raise ValueError(f"noise is {noise!r}; expected one of {', '.join(NOISE_SETS)}")
-        bounds, scheduled = read_bounds()[noise], self.scenarios.model
+        bounds, scheduled = self.bounds[noise], self.scenarios.model
         models = {"nominal": scheduled.model(noise, bounds["nominal"])}
         for name in self.faults:
             fault = self.scenarios.fault(name, LARGEST)
             models[name] = fault.model(scheduled.model(noise, bounds[name]))
         return models
 
-    def stated_faults(self, noise: str) -> dict[str, StatedFault]:
-        """The aircraft with each fault at the size of its step: alpha + 3 deg, half the elevator, 1.3 M_u."""
-        models, stated = self.models(noise), {}
-        for name, description in STATED.items():
-            fault = self.scenarios.fault(name, "step")
+    def stated_faults(self, noise: str, size: float = 1.0) -> dict[str, StatedFault]:
+        """The aircraft with each fault at the size of its step: alpha + 3 deg, half the elevator, 1.3 M_u.
+
+        ``size`` is a fraction of it, in (0, 1].
+        """
+        models, sized, stated = self.models(noise), replace(self.scenarios, size=size), {}
+        for name in self.faults:
+            fault = sized.fault(name, "step")
             if isinstance(fault, SensorFault):
                 bias = np.zeros(models["nominal"].n_outputs)
                 bias[fault.where] = fault.magnitude
-                healthy = self.scenarios.model.model(noise, read_bounds()[noise][name])
+                healthy = self.scenarios.model.model(noise, self.bounds[noise][name])
                 model = healthy.replace(c=_shifted(self.scenarios.model.blocks.block("c"), bias))
             else:
-                size = float(fault.delta(FAULT_TIME))
+                delta = float(fault.delta(FAULT_TIME))
                 *others, last = models[name].uncertainties
-                model = models[name].replace(uncertainties=[*others, replace(last, bounds=(size, size))])
-            stated[name] = StatedFault(description, model)
+                model = models[name].replace(uncertainties=[*others, replace(last, bounds=(delta, delta))])
+            stated[name] = StatedFault(_description(name, size), model)
         return stated
 
     def bank(self, noise: str) -> Bank:
@@ -153,6 +161,10 @@ class Eclipse:
         if self.architecture == "II":
             return ArchitectureII(nominal, observers, global_=initial)
         return ArchitectureI(nominal, observers)
+
+    def with_architecture(self, architecture: Literal["I", "II"]) -> Eclipse:
+        """The same plant with the other bank."""
+        return replace(self, architecture=architecture)
 
     def scheduler(self) -> AirspeedFilter:
         """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""

@@ -8,7 +8,7 @@ from functools import cache
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, design_autopilot
 from aircraft.eclipse.derivatives import Derivatives
@@ -68,9 +68,16 @@ class Scenarios:
     ----------
     model : ScheduledModel
         Gives the surrogate, the derivatives, and the direction of the dynamics fault.
+    size : float
+        Of every fault, as a fraction of the paper's, in (0, 1].
     """
 
     model: ScheduledModel = field(default_factory=lambda: ScheduledModel(TS))
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.size <= 1.0:
+            raise ValueError(f"size is {self.size}; expected a fraction of the paper's faults, 0 < size <= 1")
 
     def fault(self, name: str, profile: str) -> Fault:
         """The fault object that both corrupts a flight and gives its observer's model.
@@ -84,11 +91,11 @@ class Scenarios:
             raise ValueError(f"profile is {profile!r}; expected one of {', '.join(PROFILES)}")
         shape = PROFILES[profile][0]
         if name == "alpha":
-            return SensorFault(ALPHA, "bias", ALPHA_BIAS[profile], shape)
+            return SensorFault(ALPHA, "bias", self.size * ALPHA_BIAS[profile], shape)
         if name == "elevator":
-            return ActuatorFault(ELEVATOR, "loss", 0.5, shape)
+            return ActuatorFault(ELEVATOR, "loss", self.size * 0.5, shape)
         if name == "dynamics":
-            return PlantFault(self.model.speed_moment, 1.0, shape)
+            return PlantFault(self.model.speed_moment, self.size * 1.0, shape)
         raise ValueError(f"fault is {name!r}; expected one of alpha, elevator, dynamics")
 
     def duration(self, fault: str, profile: str) -> float:
@@ -98,8 +105,19 @@ class Scenarios:
         self.fault(fault, profile)
         return FAULT_TIME + PROFILES[profile][1]
 
-    def run(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Run:
-        """Fly once from the trim at 37 m/s; ``fault`` may be "none"."""
+    def run(
+        self,
+        fault: str,
+        profile: str,
+        noise: str,
+        seed: int | np.random.SeedSequence,
+        excitation: ArrayLike | None = None,
+    ) -> Run:
+        """Fly once from the trim at 37 m/s; ``fault`` may be "none".
+
+        ``excitation`` (samples, 2), in [deg, thrust command], is superposed on the autopilot's commands from the time
+        of the fault on; it ends with its last sample.
+        """
         samples = round(self.duration(fault, profile) / self.model.Ts)
         time = np.arange(samples, dtype=np.float64) * float(self.model.Ts)
         active = None if fault == HEALTHY else self.fault(fault, profile)
@@ -107,10 +125,21 @@ class Scenarios:
         corruption = corrupt(active, time, self.model.moment_reference)
         start = level_trim(self.model.surrogate, DESIGN_AIRSPEED).x
         controller = _autopilot(noise, self.model.Ts, self.model.surrogate)
-        flight = fly(self.model.surrogate, controller, start, gusts, sensor_noise, corruption, self.model.Ts)
+        superposed = None if excitation is None else self._from_fault(excitation, samples)
+        surrogate, Ts = self.model.surrogate, self.model.Ts
+        flight = fly(surrogate, controller, start, gusts, sensor_noise, corruption, Ts, superposed)
         airspeed = AirspeedFilter(self.model.Ts, DESIGN_AIRSPEED)
         schedule = np.array([airspeed(y) for y in flight.y])
         return Run(time, schedule, flight, sensor_noise, gusts, active)
+
+    def _from_fault(self, excitation: ArrayLike, samples: int) -> Array:
+        values, first = np.asarray(excitation, dtype=float), round(FAULT_TIME / self.model.Ts)
+        if values.ndim != 2 or values.shape[1] != 2 or len(values) > samples - first or not np.isfinite(values).all():
+            raise ValueError(
+                f"excitation has shape {values.shape}; expected finite numbers of shape (samples, 2), at most "
+                f"{samples - first} samples from the fault on"
+            )
+        return np.vstack([np.zeros((first, 2)), values, np.zeros((samples - first - len(values), 2))])
 
 
 def corrupt(fault: Fault | None, time: Array, moment_reference: float) -> Corruption:

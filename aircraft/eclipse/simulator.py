@@ -146,6 +146,7 @@ def fly(
     noise: Array,
     corruption: Corruption,
     Ts: float,
+    excitation: Array | None = None,
 ) -> Flight:
     """Fly K samples in closed loop with RK4, two substeps a sample.
 
@@ -157,6 +158,8 @@ def fly(
         [d_u, d_w, d_q], held over each sample [m/s^2, m/s^2, rad/s^2].
     noise : (K, 4) array
         Added to [V, alpha, theta, q].
+    excitation : (K, 2) array, optional
+        Superposed on the autopilot's [eta deg, tau] before the inputs' limits; the log keeps the sum.
 
     Raises
     ------
@@ -164,9 +167,10 @@ def fly(
         If the arrays differ in length, or the state leaves the finite numbers.
     """
     samples = len(disturbance)
-    arrays = (disturbance, noise, corruption.bias, corruption.effectiveness, corruption.moment)
-    names = ("disturbance", "noise", "corruption.bias", "corruption.effectiveness", "corruption.moment")
-    expected = ((samples, 3), (samples, 4), (samples, 4), (samples, 2), (samples,))
+    superposed = np.zeros((samples, 2)) if excitation is None else np.ascontiguousarray(excitation, dtype=float)
+    arrays = (disturbance, noise, superposed, corruption.bias, corruption.effectiveness, corruption.moment)
+    names = ("disturbance", "noise", "excitation", "corruption.bias", "corruption.effectiveness", "corruption.moment")
+    expected = ((samples, 3), (samples, 4), (samples, 2), (samples, 4), (samples, 2), (samples,))
     for name, array, shape in zip(names, arrays, expected, strict=True):
         if array.shape != shape:
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, one row a sample of disturbance")
@@ -216,7 +220,7 @@ def _advance(x, u, d, speed_moment, p, Ts, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fly(x, u, y, disturbance, noise, bias, effectiveness, moment, speed_moment, law, p, Ts):  # type: ignore[no-untyped-def]
+def _fly(x, u, y, disturbance, noise, excitation, bias, effectiveness, moment, speed_moment, law, p, Ts):  # type: ignore[no-untyped-def]
     A, B, C, M, K, u_trim, y_trim, lower, upper = law
     predicted = np.zeros(4)
     increase = np.zeros(5)
@@ -225,7 +229,7 @@ def _fly(x, u, y, disturbance, noise, bias, effectiveness, moment, speed_moment,
         true_output = np.array([np.hypot(x[k, 0], x[k, 1]), np.arctan2(x[k, 1], x[k, 0]), x[k, 2], x[k, 3]])
         y[k] = true_output + noise[k] + bias[k]
         estimate = predicted + M @ (y[k] - y_trim - C @ predicted)
-        u[k] = np.minimum(np.maximum(u_trim - K @ estimate, lower), upper)
+        u[k] = np.minimum(np.maximum(u_trim - K @ estimate + excitation[k], lower), upper)
         predicted = A @ estimate + B @ (u[k] - u_trim)
         if k + 1 < len(x):
             increase[4] = moment[k]

@@ -18,11 +18,13 @@ from svo.faults.blocks import (
     with_new_disturbances,
     without_columns,
 )
-from svo.faults.profiles import Profile, Step
+from svo.faults.profiles import EDGE_TOLERANCE_S, Profile, Step
 from svo.model import UncertainModel, Uncertainty
 
 Array = NDArray[np.float64]
-ActuatorKind = Literal["loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid"]
+ActuatorKind = Literal[
+    "loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid", "noise"
+]
 
 _NEEDS_TRAVEL = ("locking", "runaway")
 _NEEDS_FREQUENCY = ("oscillatory-solid", "oscillatory-liquid")
@@ -59,11 +61,13 @@ class ActuatorFault:
     hard-over           (1 - p) u + p m                  (1 - Delta) u + Delta m, any Delta in [0, 1]
     oscillatory-solid   (1 - p) u + p m sin(2 pi f t')   (1 - Delta) u + Delta v, Delta in [0, 1], |v| <= m
     oscillatory-liquid  u + p m sin(2 pi f t')           u + v, any |v| <= m
+    noise               u + p m r, |r| <= 1              u + v, any |v| <= m
     locking             (1 - p) u + p h                  any deflection within the travel
     runaway             h + m t', stopped at the travel  any deflection within the travel
     ==================  ===============================  ==================================================
 
-    where t' is the time since the start. Delta and v are free to change at each sample. Every model
+    where t' is the time since the start, and r is drawn anew for each sample time from ``seed``: uniform, and the same
+    for the same time, so that a run and its samples agree. Delta and v are free to change at each sample. Every model
     contains the healthy actuator; those of locking and runaway do so for commands within the travel (a
     command beyond it is one that no healthy actuator follows). A fault that scales or replaces the
     command adds one Uncertainty (after the nominal ones) whose Delta at a time is ``delta(t)``; if the
@@ -74,16 +78,18 @@ class ActuatorFault:
     ----------
     where : int or tuple of int
         Input channels; several share one Delta.
-    kind : {"loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid"}
+    kind : {"loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid", "noise"}
     magnitude : float or None
         Lost fraction (loss), deflection reached (hard-over), rate per second (runaway), amplitude > 0
-        (oscillatory); None for locking and floating.
+        (oscillatory, noise); None for locking and floating.
     profile : Profile
         Shape in time. A runaway has a shape of its own and takes a `Step`.
     travel : (lower, upper), optional
         Limits of the deflection, needed by locking and runaway.
     frequency_hz : float, optional
         Needed by the oscillatory kinds.
+    seed : int, optional
+        Needed by noise.
 
     Raises
     ------
@@ -97,6 +103,7 @@ class ActuatorFault:
     profile: Profile
     travel: tuple[float, float] | None = None
     frequency_hz: float | None = None
+    seed: int | None = None
 
     def __post_init__(self) -> None:
         channels(self.where)
@@ -105,6 +112,9 @@ class ActuatorFault:
         self._check_magnitude()
         self._check_given("travel", _NEEDS_TRAVEL)
         self._check_given("frequency_hz", _NEEDS_FREQUENCY)
+        self._check_given("seed", ("noise",))
+        if self.seed is not None and (not isinstance(self.seed, int | np.integer) or self.seed < 0):
+            raise ValueError(f"seed is {self.seed!r}; expected an integer >= 0")
         if self.travel is not None:
             lower, upper = self.travel
             if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
@@ -140,6 +150,8 @@ class ActuatorFault:
             assert self.frequency_hz is not None
             offset = p * self._size * np.sin(2.0 * np.pi * self.frequency_hz * self._elapsed(t))
             gain = gain if self.kind == "oscillatory-solid" else np.ones_like(p)
+        elif self.kind == "noise":
+            gain, offset = np.ones_like(p), p * self._size * self._drawn(t)
         return ActuatorLaw(gain=gain, hold=hold, offset=offset, lower=lower, upper=upper)
 
     def corrupt(self, t: ArrayLike, u: ArrayLike, held: ArrayLike | None = None) -> Array:
@@ -184,6 +196,13 @@ class ActuatorFault:
         faulty = np.flatnonzero(self.profile.value(t) > 0)
         return commands[max(int(faulty[0]) - 1, 0)] if faulty.size else np.zeros(commands.shape[-1])
 
+    def _drawn(self, t: ArrayLike) -> Array:
+        """Uniform numbers in [-1, 1], one a time, of the shape of t."""
+        assert self.seed is not None
+        times = np.rint(np.asarray(t, dtype=float) / EDGE_TOLERANCE_S).astype(np.int64)
+        draws = [np.random.default_rng([self.seed, abs(int(k))]).uniform(-1.0, 1.0) for k in times.ravel()]
+        return np.array(draws).reshape(times.shape)
+
     def _elapsed(self, t: ArrayLike) -> Array:
         return np.maximum(np.asarray(t, dtype=float) - self.profile.start, 0.0)
 
@@ -195,7 +214,7 @@ class ActuatorFault:
         if self.kind in _NEEDS_TRAVEL:
             assert self.travel is not None
             return self._with_unknown_input(nominal, *self.travel, keep_command=False)
-        if self.kind == "oscillatory-liquid":
+        if self.kind in ("oscillatory-liquid", "noise"):
             return self._with_unknown_input(nominal, -self._size, self._size, keep_command=True)
         if self.kind == "oscillatory-solid":
             return self._with_replaced_command(self._with_idle_disturbance(nominal), nominal.n_disturbances)
@@ -281,7 +300,7 @@ class ActuatorFault:
             raise ValueError(f"magnitude is {self.magnitude}; {self.kind} needs a finite number")
         if self.kind == "loss" and not 0 < self.magnitude <= 1:
             raise ValueError(f"magnitude is {self.magnitude}; expected the lost fraction, 0 < magnitude <= 1")
-        if self.kind in _NEEDS_FREQUENCY and self.magnitude <= 0:
+        if self.kind in (*_NEEDS_FREQUENCY, "noise") and self.magnitude <= 0:
             raise ValueError(f"magnitude is {self.magnitude}; expected an amplitude > 0")
         if self.kind == "runaway" and self.magnitude == 0:
             raise ValueError("magnitude is 0; expected the rate of the runaway per second (use locking for none)")

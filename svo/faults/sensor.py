@@ -40,9 +40,9 @@ class SensorFault:
     hard       (1 - p) y0 + magnitude p       (1 - Delta) y0 + Delta magnitude, any Delta in [0, 1]
     =========  =============================  =======================================================
 
-    Every model contains the healthy sensor. Scaling and hard faults add one Uncertainty (after the
-    nominal ones) whose Delta at a time is ``delta(t)``; if the nominal output is itself uncertain, each
-    product Delta_i Delta becomes one more free Delta, which contains it.
+    A dead sensor is a hard fault of magnitude zero. Every model contains the healthy sensor. Scaling and hard
+    faults add one Uncertainty (after the nominal ones) whose Delta at a time is ``delta(t)``; if the nominal output
+    is itself uncertain, each product Delta_i Delta becomes one more free Delta, which contains it.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.isolation.bank import Bank, Sample, by_name, check_counts, falsified_and_undecided
+from svo.isolation.bank_state import set_arrays, set_of
 from svo.isolation.global_logic import GlobalLogic
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.observers.step import Observer, Step
@@ -70,6 +71,13 @@ class ArchitectureI(Bank):
     def _forget(self) -> None:
         super()._forget()
         self._hull: Box | None = None
+
+    def _memory(self) -> dict[str, Array]:
+        return {} if self._hull is None else {"hull": np.array(self._hull)}
+
+    def _recall(self, arrays: Mapping[str, Array]) -> None:
+        hull = arrays.get("hull")
+        self._hull = None if hull is None else (hull[0], hull[1])
 
     def _begin_again(
         self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
@@ -164,6 +172,12 @@ class ArchitectureII(Bank):
     def _forget(self) -> None:
         super()._forget()
         self._global_set = self._constant
+
+    def _memory(self) -> dict[str, Array]:
+        return set_arrays("global", self._global_set)
+
+    def _recall(self, arrays: Mapping[str, Array]) -> None:
+        self._global_set = set_of("global", arrays)
 
     def _begin_again(
         self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample

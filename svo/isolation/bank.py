@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from inspect import signature
+from time import perf_counter
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.isolation.bank_state import restore_state, saved_state
 from svo.isolation.logic import NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
@@ -27,6 +30,22 @@ class Sample:
     u_next: ArrayLike | None
     schedule: Any
 
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """Those that are given, by name."""
+        given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule")}
+        try:
+            return {name: np.array(v, dtype=float) for name, v in given.items() if v is not None}
+        except (TypeError, ValueError) as error:
+            raise TypeError(f"schedule is {self.schedule!r}; only numbers and arrays of them can be saved") from error
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Sample:
+        """What `arrays` gave; numbers are numbers again."""
+        u, y, u_next, schedule = (arrays.get(name) for name in ("u", "y", "u_next", "schedule"))
+        if y is None:
+            raise ValueError("y is missing")
+        return cls(u, y, u_next, float(schedule) if schedule is not None and schedule.ndim == 0 else schedule)
+
 
 class Bank(ABC):
     """A nominal observer and one observer a fault, driven together; `ArchitectureI` and `ArchitectureII` are banks.
@@ -38,10 +57,13 @@ class Bank(ABC):
     observers : mapping of str to Observer
     """
 
+    _refused_by: str | None
+
     def __init__(self, logic: IsolationLogic, observers: Mapping[str, Observer], same_states: bool) -> None:
         self.names = logic.names
         self.observers: Mapping[str, Observer] = MappingProxyType(dict(observers))
         self._logic = logic
+        self._untimed = tuple(n for n, o in observers.items() if "deadline" not in signature(o.step).parameters)
         _check_observers(self.observers, same_states)
         self._forget()
 
@@ -57,29 +79,86 @@ class Bank(ABC):
         """
         if self._sample is not None:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        steps = {name: observer.update(y0, u=u, schedule=schedule) for name, observer in self._running.items()}
+        steps = self._ask(lambda observer: observer.update(y0, u=u, schedule=schedule))
         return self._conclude(0, steps, Sample(None, y0, u, schedule))
 
     def step(
-        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
+        self,
+        u: ArrayLike | None,
+        y: ArrayLike,
+        u_next: ArrayLike | None = None,
+        schedule: Any = None,
+        deadline: float | None = None,
     ) -> Verdict:
         """One transition driven by u, then the measurement y; arguments as for the observers.
+
+        Parameters
+        ----------
+        deadline : float, optional
+            Seconds for all observers together. They are stepped in the order of the bank, and each may take an equal
+            share of what is left; one that is done early leaves its time to those behind it. Sets may be wider and
+            verdicts "undecided" then, never wrong, and results depend on the machine's speed. Not cut short are the
+            exact proof of an alarm and, at the samples at which observers start again, their first programs.
 
         Raises
         ------
         ValueError
-            If there was no first measurement, or an observer refuses the arguments.
+            If there was no first measurement, an observer refuses the arguments (its name leads the message), or a
+            deadline is given to a bank with an observer whose step has none. After a refusal by another than the
+            first observer, the ones before it have seen the sample: the bank then refuses further samples until
+            `reset` or `load_state_dict`.
         """
         if self._sample is None:
             raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
-        steps = {n: o.step(u, y, u_next=u_next, schedule=schedule) for n, o in self._running.items()}
+        if deadline is None:
+            steps = self._ask(lambda observer: observer.step(u, y, u_next=u_next, schedule=schedule))
+        else:
+            steps = self._timed_steps(u, y, u_next, schedule, deadline)
         return self._conclude(self._sample + 1, steps, Sample(u, y, u_next, schedule))
+
+    def state_dict(self) -> dict[str, NDArray[Any]]:
+        """Everything that the next samples depend on, as named arrays without objects (for ``numpy.savez``).
+
+        Raises
+        ------
+        TypeError
+            If an observer has no ``state_dict``, or the schedule is no number or array of numbers.
+        """
+        return saved_state(self)
+
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on bit for bit from what `state_dict` gave; this bank must be built as that one was.
+
+        `observers` then holds new objects, made by the classes of the present ones for the same models.
+
+        Raises
+        ------
+        ValueError
+            If the state is that of a bank with other models or options, or is incomplete. The bank is unchanged.
+        """
+        restore_state(self, state)
 
     def reset(self, set: HPolytope) -> None:
         """Forget everything; all models are alive and the state at the next measurement lies in ``set``."""
         for observer in self.observers.values():
             observer.reset(set)
         self._forget()
+
+    def exchange(self, observers: Mapping[str, Observer]) -> None:
+        """Put other observers of the same models in the place of those of the same names, before the first sample.
+
+        Raises
+        ------
+        ValueError
+            If the bank has started, or has no observer of a name.
+        """
+        if self._sample is not None:
+            raise ValueError("exchange was called after the first sample; use a fresh bank")
+        for name in observers:
+            if name not in self.observers:
+                raise ValueError(f"the bank has no observer {name!r}; it has {', '.join(self.observers)}")
+        self.observers = MappingProxyType({**self.observers, **observers})
+        self._adopt(self._state)
 
     def warm_up(self) -> float:
         """Compile whatever the observers' steps need; returns the seconds that it took."""
@@ -108,12 +187,72 @@ class Bank(ABC):
     ) -> LogicState:
         """Start the observers that the logic asks for; ``steps`` may gain their answers."""
 
+    @abstractmethod
+    def _memory(self) -> dict[str, NDArray[np.float64]]:
+        """What an architecture keeps besides, as named arrays."""
+
+    @abstractmethod
+    def _recall(self, arrays: Mapping[str, NDArray[np.float64]]) -> None:
+        """Take back what `_memory` gave."""
+
     # -- inside ------------------------------------------------------------------------------------
+
+    def _timed_steps(
+        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any, deadline: float
+    ) -> dict[str, Step]:
+        end = perf_counter() + deadline
+        if not np.isfinite(deadline) or deadline <= 0:
+            raise ValueError(f"deadline is {deadline}; expected seconds > 0, or None")
+        for name in self._untimed:
+            raise ValueError(
+                f"deadline is given, but the step of observer {name!r} ({type(self.observers[name]).__name__}) has "
+                "none; leave the deadline out, or this observer"
+            )
+        left = iter(range(len(self._running), 0, -1))
+
+        def timed(observer: Observer) -> Step:
+            share = max(0.0, end - perf_counter()) / next(left)
+            return observer.step(u, y, u_next=u_next, schedule=schedule, deadline=share)
+
+        return self._ask(timed)
+
+    def _ask(self, call: Callable[[Observer], Step]) -> dict[str, Step]:
+        """The answers of the running observers, in their order."""
+        if self._refused_by is not None:
+            raise ValueError(
+                f"observer {self._refused_by!r} refused a sample that others had already seen; call reset(set), or "
+                "load_state_dict(state) of the sample before"
+            )
+        steps: dict[str, Step] = {}
+        for name, observer in self._running.items():
+            try:
+                steps[name] = call(observer)
+            except Exception as error:
+                self._refused_by = name if steps else None
+                if type(error) is ValueError:
+                    raise ValueError(f"observer {name!r}: {error}") from error
+                raise
+        return steps
 
     def _forget(self) -> None:
         self._sample: int | None = None
+        self._refused_by = None
         self._latest = Sample(None, self._nothing(), None, None)
         self._adopt(self._logic.initial())
+
+    def _resume(
+        self,
+        sample: int | None,
+        state: LogicState,
+        observers: Mapping[str, Observer],
+        arrays: Mapping[str, NDArray[np.float64]],
+    ) -> None:
+        """Go on from a saved state."""
+        latest = Sample.of_arrays(arrays)
+        self._recall(arrays)
+        self.observers = MappingProxyType(dict(observers))
+        self._sample, self._latest, self._refused_by = sample, latest, None
+        self._adopt(state)
 
     def _adopt(self, state: LogicState) -> None:
         self._state = state

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.silent_highs import new_highs
+
 Array = NDArray[np.float64]
 
 
@@ -22,8 +24,7 @@ def is_feasible(G: Array, lower: Array, upper: Array) -> tuple[bool | None, Arra
     """
     import highspy  # imported here: rarely needed, and slow to load
 
-    solver = highspy.Highs()
-    solver.setOptionValue("output_flag", False)
+    solver = new_highs()
     solver.setOptionValue("presolve", "off")  # with it, an infeasible model leaves no dual ray
     rows, columns = G.shape
     lp = highspy.HighsLp()
@@ -41,7 +42,7 @@ def is_feasible(G: Array, lower: Array, upper: Array) -> tuple[bool | None, Arra
     if status == highspy.HighsModelStatus.kOptimal:
         return True, np.zeros(rows)
     if status == highspy.HighsModelStatus.kInfeasible:
-        _, known, ray = solver.getDualRay()  # type: ignore[attr-defined]
+        _, known, ray = solver.getDualRay()
         return False, np.asarray(ray, dtype=float) if known else np.zeros(rows)
     return None, np.zeros(rows)
 

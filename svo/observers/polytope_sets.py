@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from polytopes import HPolytope, UndecidedError
 from svo.model import UncertainModel
 from svo.observers.output_rows import output_rows
-from svo.observers.polytope_step import AnyCertificate, PolytopeCertificate, PublishedCertificate, intersection
+from svo.observers.polytope_step import (
+    AnyCertificate,
+    MeasuredOutput,
+    PolytopeCertificate,
+    PublishedCertificate,
+    intersection,
+)
 from svo.observers.step import VerdictName
 from svo.observers.vertex_images import hull_normals, hull_of_images, image, limited, reach_of, template, widened_rows
 
@@ -97,7 +103,8 @@ class SoundRecursion:
         before, known = ((both,), both) if self.coupled else (sets, states)
         if not self.coupled:
             rows = HPolytope(rows.A[:, : self.model.n_states], rows.b)
-        return _cut(known, before, rows, sample.number, self.max_facets, (memory,))
+        data = MeasuredOutput(sample.stack, sample.u, sample.y, sample.noise)
+        return _cut(known, before, rows, sample.number, self.max_facets, (memory,), data)
 
 
 @dataclass(frozen=True)
@@ -164,12 +171,13 @@ def _cut(
     number: int,
     max_facets: int | None,
     memory: tuple[tuple[HPolytope, ...], ...],
+    data: MeasuredOutput | None = None,
 ) -> Outcome:
     """A set cut by more rows. "falsified" only with a proof that has been checked."""
     cut = known.intersection(rows)
     answer = cut.emptiness()
     if answer.certificate is not None:
-        certificate = PolytopeCertificate(number, before, rows, answer.certificate)
+        certificate = PolytopeCertificate(number, before, rows, answer.certificate, data)
         if certificate.verify():
             return Outcome("falsified", certificate, known, ())
     if answer.status == "nonempty":

@@ -8,11 +8,60 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import Certificate, HPolytope
+from polytopes.exact import ZERO, rational
 from svo.observers.data import directions_of
 from svo.observers.step import VerdictName
 from svo.observers.vertex_images import outer_support
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredOutput:
+    """Model and data of the sample whose measurement rows stand in a certificate.
+
+    Attributes
+    ----------
+    stack : (1 + nd, n + ny, n + nu + 1 + nw) array
+        [[A B a E], [C D c F]] and the same of each uncertainty.
+    u, y, noise : (nu,), (ny,), (ny,) arrays
+        NaN in y = that sensor is missing.
+    """
+
+    stack: Array
+    u: Array
+    y: Array
+    noise: Array
+
+    def explains(self, rows: HPolytope) -> bool | None:
+        """Whether rows over x, or (x, w), follow from |y - C x - D u - c - F w| <= noise, checked exactly.
+
+        None where an uncertainty enters the output: its rows rest on bounds of s that were computed in floats.
+        """
+        ny = self.y.size
+        if self.stack.ndim != 3 or self.noise.shape != (ny,) or self.u.ndim != 1 or len(rows.C):
+            return False
+        if not all(np.isfinite(v).all() for v in (self.stack, self.u, self.noise, rows.b)) or np.isinf(self.y).any():
+            return False
+        n, nu = self.stack.shape[1] - ny, self.u.size
+        if n < 1 or self.stack.shape[2] < n + nu + 1 or not (self.noise >= 0).all():
+            return False
+        if self.stack[1:, n:].any():
+            return None
+        outputs = self.stack[0, n:]
+        free = np.delete(outputs, np.s_[n : n + nu + 1], axis=1)
+        if rows.dim == n and not free[:, n:].any():
+            free = free[:, :n]
+        used = np.flatnonzero(~np.isnan(self.y))
+        if rows.A.shape != (2 * used.size, free.shape[1]):
+            return False
+        for i, o in enumerate(used):
+            known = sum((rational(c) * rational(v) for c, v in zip(outputs[o, n : n + nu], self.u, strict=True)), ZERO)
+            middle, noise = rational(self.y[o]) - known - rational(outputs[o, n + nu]), rational(self.noise[o])
+            for sign, row, bound in zip((1, -1), rows.A[2 * i : 2 * i + 2], rows.b[2 * i : 2 * i + 2], strict=True):
+                if not np.array_equal(row, sign * free[o]) or rational(bound) < sign * middle + noise:
+                    return False
+        return True
 
 
 @dataclass(frozen=True)
@@ -31,15 +80,20 @@ class PolytopeCertificate:
         Its rows.
     multipliers : Certificate
         For the rows of all of these, in this order.
+    data : MeasuredOutput or None
+        What the measurement rows come from; None in a stack of equation (3), whose rows are not a measurement's only.
     """
 
     sample: int
     before: tuple[HPolytope, ...]
     measurement: HPolytope
     multipliers: Certificate
+    data: MeasuredOutput | None = None
 
     def verify(self) -> bool:
-        """Whether the multipliers prove that the sets and the measurement exclude each other."""
+        """Whether the multipliers prove that sets and measurement exclude each other, and the data give its rows."""
+        if self.data is not None and self.data.explains(self.measurement) is False:
+            return False
         return self.multipliers.verify(intersection([*self.before, self.measurement]))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -58,8 +59,12 @@ class Observer(Protocol):
         """A measurement without a transition (the first one)."""
         ...
 
-    def step(self, u: Any, y: Any, u_next: Any = None, schedule: Any = None) -> Step:
-        """One transition driven by u, then the measurement y."""
+    @property
+    def step(self) -> Callable[..., Step]:
+        """Called as step(u, y, u_next=None, schedule=None): one transition driven by u, then the measurement y.
+
+        It may take a ``deadline`` in seconds besides.
+        """
         ...
 
     def reset(self, set: HPolytope) -> None:

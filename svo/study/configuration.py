@@ -8,11 +8,12 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from svo.plant import HEALTHY, Plant
+from svo.plant import HEALTHY, Plant, architecture_of, in_architecture
 
 _PACKAGES = ("svo-fdi", "numpy", "scipy", "numba", "highspy", "python-flint", "pyarrow")
 
@@ -31,6 +32,8 @@ class Job:
         Seed of this run alone: ``svo simulate`` with it makes the same log.
     exemplary : bool
         Whether the run is the one of its kind whose samples are kept for the pictures.
+    architecture : str or None
+        Of the bank; None for a plant that has one kind of bank only.
     """
 
     run: int
@@ -39,6 +42,7 @@ class Job:
     noise: str
     seed: int
     exemplary: bool
+    architecture: str | None = None
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,8 @@ class StudyConfiguration:
         Runs of each noise set, fault and profile.
     seed : int
         The seed that all others are spawned from.
+    architectures : tuple of str
+        Of the plant's bank; empty for a plant that has one kind of bank only. All see the same flights.
     """
 
     plant: str
@@ -64,6 +70,7 @@ class StudyConfiguration:
     faults: tuple[str, ...]
     runs: int
     seed: int
+    architectures: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.runs < 1:
@@ -74,19 +81,29 @@ class StudyConfiguration:
             values = getattr(self, name)
             if not values or len(set(values)) != len(values):
                 raise ValueError(f"{name} is {values}; expected one or more different names")
+        if len(set(self.architectures)) != len(self.architectures):
+            raise ValueError(f"architectures is {self.architectures}; expected different names")
 
     @classmethod
     def for_plant(
-        cls, plant: Plant, *, runs: int, seed: int, noise: Sequence[str] = (), faults: Sequence[str] = ()
+        cls,
+        plant: Plant,
+        *,
+        runs: int,
+        seed: int,
+        noise: Sequence[str] = (),
+        faults: Sequence[str] = (),
+        architectures: Sequence[str] = (),
     ) -> StudyConfiguration:
         """A configuration checked against a plant.
 
-        Without ``noise`` it has the plant's default noise set, without ``faults`` all faults and the fault-free runs.
+        Without ``noise`` it has the plant's default noise set, without ``faults`` all faults and the fault-free runs,
+        without ``architectures`` the plant's own.
 
         Raises
         ------
         ValueError
-            If the plant has no noise set or fault of a name; the message lists those that it has.
+            If the plant has no noise set, fault or architecture of a name; the message lists those that it has.
         """
         noise = tuple(noise) or plant.noise_sets[:1]
         faults = tuple(faults) or (HEALTHY, *plant.faults)
@@ -95,13 +112,17 @@ class StudyConfiguration:
         for name in faults:
             if name != HEALTHY:
                 check_fault(plant, name)
-        return cls(plant=plant.name, noise=noise, faults=faults, runs=runs, seed=seed)
+        for name in architectures:
+            in_architecture(plant, name)
+        own = architecture_of(plant)
+        chosen = tuple(architectures) or (() if own is None else (own,))
+        return cls(plant=plant.name, noise=noise, faults=faults, runs=runs, seed=seed, architectures=chosen)
 
     def jobs(self, plant: Plant) -> list[Job]:
         """The runs in their order.
 
         The seed of a run depends on the study's seed, on the run's place among those of its kind, and on nothing
-        else: neither on the number of runs nor on which faults and noise sets were chosen.
+        else: neither on the number of runs nor on which faults, noise sets and architectures were chosen.
         """
         every = [(n, f, p) for n in plant.noise_sets for f, p in conditions(plant)]
         jobs: list[Job] = []
@@ -110,10 +131,12 @@ class StudyConfiguration:
         ):
             if noise not in self.noise or fault not in self.faults:
                 continue
-            for i, child in enumerate(parent.spawn(self.runs)):
-                # 53 bits: an integer that JSON readers keep exactly.
-                seed = int(child.generate_state(1, np.uint64)[0] >> np.uint64(11))
-                jobs.append(Job(len(jobs), fault, profile, noise, seed, exemplary=i == 0))
+            # 53 bits: an integer that JSON readers keep exactly.
+            seeds = [int(c.generate_state(1, np.uint64)[0] >> np.uint64(11)) for c in parent.spawn(self.runs)]
+            jobs += [
+                Job(len(jobs) + j, fault, profile, noise, seeds[i], exemplary=i == 0, architecture=architecture)
+                for j, (architecture, i) in enumerate(product(self.architectures or (None,), range(self.runs)))
+            ]
         return jobs
 
     def to_dict(self) -> dict[str, Any]:

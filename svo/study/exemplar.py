@@ -38,6 +38,7 @@ class Exemplar:
     Attributes
     ----------
     fault, profile, noise : str
+    architecture : str or None
     names : tuple of str
         The observers, "nominal" first.
     time : (K,) array
@@ -61,6 +62,7 @@ class Exemplar:
     upper: Array
     x: Array
     snapshots: tuple[Snapshot, ...]
+    architecture: str | None = None
 
     @property
     def last_falsification(self) -> int:
@@ -75,7 +77,7 @@ class Exemplar:
     def save(self, path: Path) -> None:
         """Write all of it as a compressed .npz without pickled objects."""
         header: dict[str, Any] = {"fault": self.fault, "profile": self.profile, "noise": self.noise}
-        header["names"] = list(self.names)
+        header |= {"names": list(self.names), "architecture": self.architecture}
         header["snapshots"] = [{"sample": s.sample, "event": s.event, "sets": list(s.sets)} for s in self.snapshots]
         arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
         arrays |= {name: getattr(self, name) for name in ("time", "alive", "lower", "upper", "x")}
@@ -100,7 +102,10 @@ class Exemplar:
             )
             arrays = {name: data[name] for name in ("time", "alive", "lower", "upper", "x")}
         names = tuple(header["names"])
-        return cls(header["fault"], header["profile"], header["noise"], names, snapshots=snapshots, **arrays)
+        return cls(
+            header["fault"], header["profile"], header["noise"], names,
+            snapshots=snapshots, architecture=header["architecture"], **arrays,
+        )  # fmt: skip
 
 
 def planar_outline(step: Step) -> HPolytope:
@@ -147,4 +152,7 @@ def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
             i = names.index(name)
             lower[k, i], upper[k, i] = step.box
     snapshots.append(Snapshot(len(log) - 1, "end of the run", sets))
-    return Exemplar(job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots))
+    return Exemplar(
+        job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots),
+        job.architecture,
+    )  # fmt: skip

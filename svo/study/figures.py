@@ -11,6 +11,7 @@ from svo.plant import HEALTHY, Plant
 from svo.study import plots
 from svo.study.exemplar import Exemplar
 from svo.study.summary import ConditionSummary
+from svo.study.tables import architectures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,29 +56,51 @@ def _pictures(
 ) -> Iterator[Picture]:
     for noise in dict.fromkeys(s.noise for s in summaries):
         chosen = [s for s in summaries if s.noise == noise and s.fault != HEALTHY]
-        shown = [e for e in exemplars if e.noise == noise and e.fault != HEALTHY]
         if not chosen:
             continue
         text = "Bars: mean; lines: 5–95 % of the runs; a count where not every run got there."
         if plant.reference:
             text += " Diamonds: the paper's figures; triangles point down from its upper bounds."
         title = f"Times to detect and to isolate, {noise} noise"
-        yield _save(folder / f"delays_{noise}.png", _delays(plant, chosen), title, text)
-        title = f"Models alive over time, {noise} noise"
-        text = "One run of each fault and profile. A bar ends where the model is falsified, with the delay beside it."
-        yield _save(folder / f"alive_{noise}.png", _alive(plant, shown), title, text)
-        slow = _slowest(shown)
-        if slow[0].x.shape[1] > 1:
-            title = f"Sets of the models and the true state, {noise} noise"
-            text = (
-                "Projections on the two states in which the models drift furthest apart, in the slowest exemplary run "
-                "of each fault, at the last samples before models are falsified. The cross is the true state; a model "
-                "is falsified when its set becomes empty."
-            )
-            yield _save(folder / f"sets_{noise}.png", _sets(plant, slow), title, text)
-        title = f"Bounds and true state, {noise} noise"
-        text = "The same runs: what the nominal model (until it is falsified) and the true fault's model allow."
-        yield _save(folder / f"bounds_{noise}.png", _bounds(plant, slow), title, text)
+        banks = architectures(chosen)
+        draw = _delays if len(banks) == 1 else _architectures
+        yield _save(folder / f"delays_{noise}.png", draw(plant, chosen), title, text)
+        for bank in banks:
+            shown = [e for e in exemplars if (e.noise, e.architecture) == (noise, bank) and e.fault != HEALTHY]
+            several = len(banks) > 1
+            where = f"{noise} noise" + (f", Architecture {bank}" if several else "")
+            yield from _of_runs(folder, plant, shown, where, f"{noise}_{bank}" if several else noise)
+
+
+def _of_runs(folder: Path, plant: Plant, shown: Sequence[Exemplar], where: str, suffix: str) -> Iterator[Picture]:
+    """The pictures of exemplary runs of one bank with one noise set."""
+    title = f"Models alive over time, {where}"
+    text = "One run of each fault and profile. A bar ends where the model is falsified, with the delay beside it."
+    yield _save(folder / f"alive_{suffix}.png", _alive(plant, shown), title, text)
+    slow = _slowest(shown)
+    if slow[0].x.shape[1] > 1:
+        title = f"Sets of the models and the true state, {where}"
+        text = (
+            "Projections on the two states in which the models drift furthest apart, in the slowest exemplary run "
+            "of each fault, at the last samples before models are falsified. The cross is the true state; a model "
+            "is falsified when its set becomes empty."
+        )
+        yield _save(folder / f"sets_{suffix}.png", _sets(plant, slow), title, text)
+    title = f"Bounds and true state, {where}"
+    text = "The same runs: what the nominal model (until it is falsified) and the true fault's model allow."
+    yield _save(folder / f"bounds_{suffix}.png", _bounds(plant, slow), title, text)
+
+
+def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
+    conditions = len({(s.fault, s.profile) for s in summaries})
+    figure = _figure(max(6.5, 1.0 * conditions), 6.0)
+    axes = figure.subplots(2, 1, sharex=True)
+    for ax, event in zip(axes, ("detect", "isolate"), strict=True):
+        plots.plot_architectures(summaries, event, plant.Ts, plant.reference, ax)
+        ax.set_ylabel(f"time to {event} [s]")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=len(handles))
+    return figure
 
 
 def _delays(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:

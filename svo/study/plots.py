@@ -38,31 +38,70 @@ def plot_delays(
     Where a delay was not reached in every run, the count stands above the bar. ``reference`` figures are drawn as
     diamonds, or as triangles that point down where the paper gives an upper bound.
     """
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     ax = _axes(ax)
     faulty = [s for s in summaries if s.fault != HEALTHY]
-    floor = Ts / 2
     artists: list[Artist] = []
     for offset, name, colour, label in ((-0.19, "detect", DETECT, "detected"), (0.19, "isolate", ISOLATE, "isolated")):
         delays: list[Delays] = [getattr(s, name) for s in faulty]
         at = np.arange(len(faulty)) + offset
-        heights = [(d.mean or floor) - floor for d in delays]
-        artists += ax.bar(at, heights, 0.36, bottom=floor, color=colour, label=f"{label}: mean, 5–95 %", zorder=2)
-        artists += [artist for x, d in zip(at, delays, strict=True) for artist in _whisker(ax, x, d, floor)]
+        artists += _bars(ax, at, delays, 0.36, Ts / 2, colour, label)
         marks = [(reference or {}).get((s.fault, s.profile)) for s in faulty]
         artists += _reference_marks(ax, at, [getattr(m, name) if m else "" for m in marks])
+    _delay_axes(ax, [f"{s.fault}\n{s.profile}" for s in faulty], Ts / 2)
+    ax.set_ylabel("time after the fault [s]")
+    return artists
+
+
+def plot_architectures(
+    summaries: Sequence[ConditionSummary],
+    event: str,
+    Ts: float,
+    reference: Mapping[tuple[str, str], Reference] | None = None,
+    ax: Axes | None = None,
+) -> list[Artist]:
+    """Bars of mean times to "detect" or "isolate", the architectures side by side; otherwise as `plot_delays`."""
+    ax = _axes(ax)
+    faulty = [s for s in summaries if s.fault != HEALTHY]
+    conditions = list(dict.fromkeys((s.fault, s.profile) for s in faulty))
+    banks = list(dict.fromkeys(s.architecture for s in faulty))
+    width = 0.76 / len(banks)
+    artists: list[Artist] = []
+    for i, bank in enumerate(banks):
+        chosen = [s for s in faulty if s.architecture == bank]
+        at = np.array([conditions.index((s.fault, s.profile)) for s in chosen]) + (i - (len(banks) - 1) / 2) * width
+        delays = [getattr(s, event) for s in chosen]
+        tone = COLOURS[1 + (i + 1) % (len(COLOURS) - 1)]
+        artists += _bars(ax, at, delays, 0.95 * width, Ts / 2, tone, f"Architecture {bank}")
+    marks = [(reference or {}).get(key) for key in conditions]
+    artists += _reference_marks(
+        ax, np.arange(len(conditions), dtype=float), [getattr(m, event) if m else "" for m in marks]
+    )
+    _delay_axes(ax, [f"{fault}\n{profile}" for fault, profile in conditions], Ts / 2)
+    ax.set_ylabel("time after the fault [s]")
+    return artists
+
+
+def _bars(
+    ax: Axes, at: np.ndarray, delays: Sequence[Delays], width: float, floor: float, colour: str, label: str
+) -> list[Artist]:
+    """Bars of means with their whiskers, on a logarithmic axis that begins at ``floor``."""
+    heights = [(d.mean or floor) - floor for d in delays]
+    bars = ax.bar(at, heights, width, bottom=floor, color=colour, label=f"{label}: mean, 5–95 %", zorder=2)
+    return [*bars, *(artist for x, d in zip(at, delays, strict=True) for artist in _whisker(ax, x, d, floor))]
+
+
+def _delay_axes(ax: Axes, labels: Sequence[str], floor: float) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     ax.set_yscale("log")
     ax.set_ylim(bottom=floor)
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     ax.yaxis.set_minor_formatter(NullFormatter())
-    ax.set_ylabel("time after the fault [s]")
-    ax.set_xticks(range(len(faulty)), [f"{s.fault}\n{s.profile}" for s in faulty])
+    ax.set_xticks(range(len(labels)), list(labels))
     ax.tick_params(axis="x", length=0)
     ax.grid(axis="y", color="#D9DDE2", linewidth=0.7, zorder=0)
     ax.margins(y=0.15)
-    return artists
 
 
 def plot_alive(exemplar: Exemplar, fault_time: float, Ts: float, ax: Axes | None = None) -> list[Artist]:

@@ -164,6 +164,7 @@ def _text(value: Any) -> str:
 def _command(plant: Plant, configuration: Mapping[str, Any]) -> str:
     options = [f"--runs {configuration['runs']}", f"--seed {configuration['seed']}"]
     options += [f"--noise {name}" for name in configuration["noise"]]
+    options += [f"--architecture {name}" for name in configuration.get("architectures", ())]
     if list(configuration["faults"]) != [HEALTHY, *plant.faults]:
         options += [f"--fault {name}" for name in configuration["faults"]]
     return f"svo study {configuration['plant']} {' '.join(options)} --out DIR"

@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from svo.alarms import Alarm
-from svo.detect import alarms_of
+from svo.detect import alarms_of, source_of_bank
 from svo.isolation.record import BankRecord
 from svo.log import Log
-from svo.plant import HEALTHY, Plant, load_plant
+from svo.plant import HEALTHY, Plant, in_architecture, load_plant
 from svo.study.configuration import Job
 from svo.study.exemplar import Exemplar, follow
 
@@ -43,6 +43,8 @@ class RunRow:
         Median and 99th percentile over the observers that were alive and the samples.
     undecided : int
         Answers of observers that were neither a proof nor a point: solver trouble, never an alarm.
+    architecture : str or None
+        Of the bank; None for a plant that has one kind of bank only.
     """
 
     run: int
@@ -60,6 +62,7 @@ class RunRow:
     microseconds_per_step: float
     microseconds_p99: float
     undecided: int
+    architecture: str | None = None
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,7 @@ def run_registered(plant: str, job: Job) -> RunOutcome:
 
 def execute(plant: Plant, job: Job) -> RunOutcome:
     """Simulate one run and judge it; bit for bit the same for the same job, times of computation aside."""
+    plant = in_architecture(plant, job.architecture)
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     record = plant.bank(job.noise).run(log)
     exemplar = follow(plant, job, log) if job.exemplary else None
@@ -120,13 +124,14 @@ def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
         microseconds_per_step=float(np.median(seconds) * 1e6),
         microseconds_p99=float(np.quantile(seconds, 0.99) * 1e6),
         undecided=int(record.undecided.sum()),
+        architecture=job.architecture,
     )
 
 
 def source_of(plant: Plant, job: Job) -> dict[str, str | int | float]:
     """Where the alarms of a run come from, as stored with them."""
     return {
-        "plant": plant.name,
+        **source_of_bank(plant),
         "fault": job.fault,
         "profile": job.profile,
         "noise": job.noise,

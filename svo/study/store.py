@@ -35,6 +35,7 @@ _TYPES = {
     "microseconds_per_step": "float64",
     "microseconds_p99": "float64",
     "undecided": "int64",
+    "architecture": "string",
 }
 
 

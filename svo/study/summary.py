@@ -84,6 +84,8 @@ class ConditionSummary:
         Per observer and sample: medians over the runs of the runs' median and 99th percentile.
     undecided : int
         Answers of observers that were neither a proof nor a point, in all runs.
+    architecture : str or None
+        Of the bank; None for a plant that has one kind of bank only.
     """
 
     noise: str
@@ -98,13 +100,14 @@ class ConditionSummary:
     microseconds_median: float
     microseconds_p99: float
     undecided: int
+    architecture: str | None = None
 
 
 def summarise(rows: Iterable[RunRow]) -> list[ConditionSummary]:
-    """One summary per noise set, fault and profile, in the order of their first runs."""
-    groups: dict[tuple[str, str, str], list[RunRow]] = {}
+    """One summary per noise set, fault, profile and architecture, in the order of their first runs."""
+    groups: dict[tuple[str, str, str, str | None], list[RunRow]] = {}
     for row in rows:
-        groups.setdefault((row.noise, row.fault, row.profile), []).append(row)
+        groups.setdefault((row.noise, row.fault, row.profile, row.architecture), []).append(row)
     return [_summarise(*key, group) for key, group in groups.items()]
 
 
@@ -122,7 +125,9 @@ def to_json(summaries: Iterable[ConditionSummary]) -> list[dict[str, Any]]:
     return [asdict(summary) for summary in summaries]
 
 
-def _summarise(noise: str, fault: str, profile: str, rows: list[RunRow]) -> ConditionSummary:
+def _summarise(
+    noise: str, fault: str, profile: str, architecture: str | None, rows: list[RunRow]
+) -> ConditionSummary:
     kept = Counter(row.alive_end or "none" for row in rows if fault != HEALTHY and row.isolation_delay_s is None)
     return ConditionSummary(
         noise=noise,
@@ -137,6 +142,7 @@ def _summarise(noise: str, fault: str, profile: str, rows: list[RunRow]) -> Cond
         microseconds_median=float(np.median([row.microseconds_per_step for row in rows])),
         microseconds_p99=float(np.median([row.microseconds_p99 for row in rows])),
         undecided=sum(row.undecided for row in rows),
+        architecture=architecture,
     )
 
 
@@ -166,7 +172,7 @@ def _flat(summary: ConditionSummary) -> dict[str, Any]:
     row |= _flat_share("false_alarm", summary.false_alarms) | _flat_share("wrong_isolation", summary.wrong_isolations)
     row["not_isolated_share"] = 1 - summary.isolate.reached.value
     row["survivors"] = "; ".join(f"{names}: {count}" for names, count in summary.survivors.items())
-    for name in ("microseconds_median", "microseconds_p99", "undecided"):
+    for name in ("microseconds_median", "microseconds_p99", "undecided", "architecture"):
         row[name] = getattr(summary, name)
     return row
 

@@ -34,12 +34,18 @@ def delay_table(plant: Plant, summaries: Sequence[ConditionSummary]) -> TextTabl
     Each delay is given as mean over the runs that reached it, median and 5-95 % range over all runs (an infinity
     sign where the quantile falls among those that did not), and the number of runs that reached it.
     """
-    header = ["fault", "profile"]
+    several = len(architectures(summaries)) > 1
+    header = ["fault", "profile", *["arch."] * several]
     for event in ("detect", "isolate"):
         header += [f"{event} [s]\nmean", "\nmedian", "\n5–95 %", "\nruns"] + ["\npaper"] * bool(plant.reference)
     header += ["false\nalarms", "wrong\nisol."]
-    rows = [_delay_row(plant, summary) for summary in summaries]
-    return TextTable(f"{summaries[0].noise} noise: {plant.title}", tuple(header), tuple(rows), labels=2)
+    rows = [_delay_row(plant, summary, several) for summary in summaries]
+    return TextTable(f"{summaries[0].noise} noise: {plant.title}", tuple(header), tuple(rows), labels=2 + several)
+
+
+def architectures(summaries: Iterable[ConditionSummary]) -> tuple[str | None, ...]:
+    """Architectures of the banks, in order."""
+    return tuple(dict.fromkeys(s.architecture for s in summaries))
 
 
 def not_isolated(summaries: Sequence[ConditionSummary]) -> list[str]:
@@ -49,7 +55,8 @@ def not_isolated(summaries: Sequence[ConditionSummary]) -> list[str]:
         if s.survivors:
             who = "; ".join(f"{names} ({count})" for names, count in s.survivors.items())
             runs = f"{sum(s.survivors.values())} of {s.runs} runs"
-            lines.append(f"not isolated, {s.noise} noise: {s.fault} {s.profile} in {runs}; alive at the end: {who}")
+            where = f"{s.noise} noise" + (f", Architecture {s.architecture}" if s.architecture else "")
+            lines.append(f"not isolated, {where}: {s.fault} {s.profile} in {runs}; alive at the end: {who}")
     return lines
 
 
@@ -104,12 +111,13 @@ def to_rich(table: TextTable) -> Table:
     return rich_table
 
 
-def _delay_row(plant: Plant, summary: ConditionSummary) -> tuple[str, ...]:
+def _delay_row(plant: Plant, summary: ConditionSummary, with_architecture: bool) -> tuple[str, ...]:
     reference = plant.reference.get((summary.fault, summary.profile))
     row = [
         "no fault" if summary.fault == HEALTHY else summary.fault,
         "" if summary.fault == HEALTHY else summary.profile,
     ]
+    row += [summary.architecture or ""] * with_architecture
     for event, delays in (("detect", summary.detect), ("isolate", summary.isolate)):
         row += [""] * 4 if summary.fault == HEALTHY else _delay_cells(delays, plant.Ts)
         if plant.reference:

@@ -238,7 +238,7 @@ def test_a_record_whose_parts_contradict_proves_nothing(
         (b"what is this", "not JSON"), (b'{"format": ', "not JSON"), (b"\xff\xfe\x00", "not JSON"),
         (b"[" * 100_000, "not JSON"), (b"[1, 2]", "not an alarm record"), (b"null", "not an alarm record"),
         (b"{}", "not an alarm record"), (b'{"format": "svo-alarm-0"}', "not an alarm record"),
-        (b'{"format": "svo-alarm-1"}', "SHA-256"), (b'{"format": "svo-alarm-1", "sha256": 5}', "SHA-256"),
+        (b'{"format": "svo-alarm-2"}', "SHA-256"), (b'{"format": "svo-alarm-2", "sha256": 5}', "SHA-256"),
     ],
 )  # fmt: skip
 def test_a_line_that_is_no_record_is_reported_among_good_ones(

@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from svo.cli import app
+from svo.study.store import StudyFolder
 
 
 def svo(*arguments: str | Path) -> Any:
@@ -214,3 +215,64 @@ def test_the_whole_chain_is_proven(log: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert all("proven from the first sample" in check["reason"] for check in json.loads(result.stdout))
     assert "leave --log out" in one_line(svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--log", log))
+
+
+def test_a_plant_with_one_bank_has_no_architectures(log: Path, tmp_path: Path) -> None:
+    for command in (["detect", "tank", log], ["study", "tank", "--out", tmp_path / "study"]):
+        message = one_line(svo(*command, "--architecture", "II"))
+        assert "plant 'tank' has one bank only (no with_architecture)" in message
+    unknown = svo("study", "eclipse", "--architecture", "III", "--out", tmp_path / "study")
+    assert "plant 'eclipse' has no architecture 'III'; it has I, II" in one_line(unknown)
+
+
+def test_both_architectures_see_the_same_runs_side_by_side(registered_tank: str, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    options = ["--runs", "2", "--workers", "1", "--architecture", "I", "--architecture", "II"]
+    result = svo("study", "tank2", *options, "--out", out)
+    assert result.exit_code == 0, result.output
+    table = [line.split() for line in result.stdout.splitlines() if line.strip().startswith(("leak", "gauge"))]
+    kinds = [("leak", "step"), ("leak", "ramp"), ("gauge", "step")]
+    assert [row[:3] for row in table] == [[*kind, a] for kind in kinds for a in ("I", "II")]
+    rows = StudyFolder(out).rows()
+    first, second = ([row for row in rows if row.architecture == a] for a in ("I", "II"))
+    assert len(first) == len(second) == 8
+    for a, b in zip(first, second, strict=True):
+        assert (a.seed, a.fault, a.profile) == (b.seed, b.fault, b.profile)
+        assert a.detection_delay_s == b.detection_delay_s  # the nominal observer runs from the start in both
+    assert not any(row.wrong_isolation or row.false_alarm for row in rows)
+    assert json.loads((out / "study.json").read_text())["configuration"]["architectures"] == ["I", "II"]
+    assert "--architecture I --architecture II" in (out / "report.html").read_text()
+    assert (out / "delays_calm.png").exists()
+    assert (out / "alive_calm_II.png").exists()
+    assert svo("verify", out / "alarms.jsonl").exit_code == 0
+
+
+def test_the_chain_of_a_model_that_starts_late_is_proven_from_its_start(registered_tank: str, tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    assert svo("simulate", "tank2", "--fault", "leak", "--seed", "3", "--out", log).exit_code == 0
+    result = svo("detect", "tank2", log, "--architecture", "II", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
+    assert result.exit_code == 0, result.output
+    reasons = {check["observer"]: check["reason"] for check in json.loads(result.stdout)}
+    assert "proven from the first sample" in reasons["nominal"]
+    assert "proven from its start at sample" in reasons["gauge"]
+    assert "given the global set" in reasons["gauge"]
+
+
+def test_a_bound_that_is_not_proven_fails_the_chain(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from svo.observers.chain import ProvingObserver
+
+    honest = ProvingObserver._check_arrival
+
+    def check_after_cheating(self: ProvingObserver, program: int, target: int) -> None:
+        if program == 0:
+            self._arrays["new_upper"][0] -= 1e-9
+        honest(self, program, target)
+
+    assert svo("detect", "tank", log, "--out", tmp_path).exit_code == 0
+    monkeypatch.setattr(ProvingObserver, "_check_arrival", check_after_cheating)
+    result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
+    assert result.exit_code == 1
+    reasons = [check["reason"] for check in json.loads(result.stdout)]
+    assert all("bounds are not proven, first: arrival bound 0" in reason for reason in reasons)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from polytopes import HPolytope
 from svo import Distinguishability, UncertainModel, Uncertainty, WindowObserver, distinguishability
 from svo.cli import app
-from svo.distinguish import Explanation
+from svo.model_pair import Explanation
 from tests.svo.observers.random_plants import random_plant
 
 Array = NDArray[np.float64]

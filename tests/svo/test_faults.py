@@ -17,6 +17,7 @@ from svo.model import UncertainModel, Uncertainty
 SENSOR_KINDS = ("bias", "drift", "scaling", "hard")
 ACTUATOR_KINDS = (
     "loss", "floating", "hard-over", "oscillatory-solid", "oscillatory-liquid", "locking", "runaway",
+    "noise",
 )  # fmt: skip
 TRAVEL = (-3.0, 2.0)
 START = 0.4
@@ -120,7 +121,7 @@ def achieved_deflection(
             return (1 - p) * u + p * magnitude
         case "oscillatory-solid":
             return (1 - p) * u + p * v
-        case "oscillatory-liquid":
+        case "oscillatory-liquid" | "noise":
             return u + v
         case "locking":
             return (1 - p) * u + p * held
@@ -179,6 +180,7 @@ def test_a_faulty_actuator_is_explained_by_its_model(seed: int, kind: Any, sched
         Step(START) if kind == "runaway" else some_profile(rng),
         travel=TRAVEL if kind in ("locking", "runaway") else None,
         frequency_hz=1.3 if kind.startswith("oscillatory") else None,
+        seed=5 if kind == "noise" else None,
     )
     model, held = fault.model(nominal), rng.uniform(*TRAVEL, size=nominal.n_inputs)
     for t in np.arange(0, 3, 0.3):
@@ -187,6 +189,9 @@ def test_a_faulty_actuator_is_explained_by_its_model(seed: int, kind: Any, sched
         wave = float(np.sin(2 * np.pi * 1.3 * max(t - START, 0)))
         amplitude = {"oscillatory-solid": 1.0, "oscillatory-liquid": p}.get(kind)
         v = np.zeros(0) if amplitude is None else np.full(len(where), amplitude * magnitude * wave)
+        if kind == "noise":
+            v = (fault.corrupt(t, 0 * sample.u) - 0 * sample.u)[list(where)]
+            assert (np.abs(v) <= p * magnitude).all()
         moved[list(where)] = achieved_deflection(kind, u, p, t - START, magnitude, held[list(where)], v)
         np.testing.assert_allclose(fault.corrupt(t, sample.u, held), moved, atol=1e-12)
         for achieved, delta in ((moved, float(fault.delta(t))), (sample.u, 0.0)):
@@ -234,6 +239,7 @@ def test_a_whole_run_is_corrupted_as_its_samples_are(kind: Any) -> None:
         Step(0.7),
         travel=TRAVEL if kind in ("locking", "runaway") else None,
         frequency_hz=0.5 if kind.startswith("oscillatory") else None,
+        seed=5 if kind == "noise" else None,
     )
     whole = fault.corrupt(t, u)
     by_sample = np.array([fault.corrupt(tk, uk, held=u[6]) for tk, uk in zip(t, u, strict=True)])
@@ -244,6 +250,17 @@ def test_a_whole_run_is_corrupted_as_its_samples_are(kind: Any) -> None:
         np.testing.assert_array_equal(whole[7:, 1], np.full(23, u[6, 1]))
     if kind == "runaway":
         np.testing.assert_allclose(whole[7:10, 1], np.minimum(u[6, 1] + 0.8 * (t[7:10] - 0.7), TRAVEL[1]))
+
+
+def test_noise_is_uniform_the_same_for_the_same_time_and_another_for_another_seed() -> None:
+    t, u = np.arange(2000) * 0.01, np.ones((2000, 2))
+    found = [ActuatorFault(0, "noise", 0.5, Step(1.0), seed=seed).corrupt(t, u)[:, 0] - 1.0 for seed in (3, 3, 4)]
+    np.testing.assert_array_equal(found[0], found[1])
+    assert not np.array_equal(found[0], found[2])
+    assert (found[0][:100] == 0).all()
+    assert np.abs(found[0]).max() <= 0.5
+    assert np.std(found[0][100:]) == pytest.approx(0.5 / np.sqrt(3), rel=0.05)
+    assert abs(np.corrcoef(found[0][100:-1], found[0][101:])[0, 1]) < 0.1
 
 
 def test_a_runaway_stops_at_its_travel() -> None:
@@ -349,6 +366,10 @@ def test_a_profile_stays_between_zero_and_one(t: float, profile: Any) -> None:
         (lambda: ActuatorFault(0, "oscillatory-liquid", 1.0, Step()), "frequency_hz is None"),
         (lambda: ActuatorFault(0, "oscillatory-solid", 1.0, Step(), frequency_hz=0.0), "frequency_hz is 0"),
         (lambda: ActuatorFault(0, "oscillatory-solid", -1.0, Step(), frequency_hz=1.0), "amplitude > 0"),
+        (lambda: ActuatorFault(0, "noise", 1.0, Step()), "seed is None; noise needs one"),
+        (lambda: ActuatorFault(0, "noise", 1.0, Step(), seed=-1), "seed is -1; expected an integer >= 0"),
+        (lambda: ActuatorFault(0, "noise", -1.0, Step(), seed=1), "amplitude > 0"),
+        (lambda: ActuatorFault(0, "loss", 0.5, Step(), seed=1), "loss takes none"),
         (lambda: ActuatorFault(0, "runaway", 0.0, Step(), travel=(-1, 1)), "rate of the runaway"),
         (lambda: ActuatorFault(0, "runaway", 1.0, Ramp(0.0, 1.0), travel=(-1, 1)), "give it a Step"),
         (lambda: PlantFault(Uncertainty(), 0.0, Step()), "not zero"),

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER, REFERENCE, Eclipse, eclipse
+from aircraft.eclipse.scenarios import Scenarios
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
-from svo.plant import Plant, load_plant
+from svo.detect import verdicts
+from svo.isolation.architectures import ArchitectureII
+from svo.plant import Plant, architecture_of, in_architecture, load_plant
 
 PLANT = eclipse()
 
@@ -108,3 +111,37 @@ def test_dynamics_fault_in_deviation_coordinates_is_explained_by_the_nominal_mod
     record = deviation.bank("quiet").run(deviation.simulate("dynamics", "step", "quiet", 0))
     assert record.detected_at is None
     assert record.alive.all()
+
+
+def test_the_bank_of_the_other_architecture_starts_its_fault_observers_at_the_detection():
+    plant = in_architecture(PLANT, "II")
+    assert (architecture_of(PLANT), architecture_of(plant)) == ("I", "II")
+    log = plant.simulate("elevator", "step", "quiet", 3)
+    bank = plant.bank("quiet")
+    states = [v.state for v in verdicts(bank, log)]
+    record = plant.bank("quiet").run(log)
+    assert isinstance(bank, ArchitectureII)
+    assert record.fault == "elevator"
+    assert states[:50] == ["nominal"] * 50
+    assert record.died_at["elevator"] is None
+
+
+def test_an_excited_flight_follows_the_input_that_is_superposed():
+    excitation = np.column_stack([np.full(20, 3.0), np.zeros(20)])
+    plain = PLANT.scenarios.run("none", "none", "quiet", 0)
+    excited = PLANT.scenarios.run("none", "none", "quiet", 0, excitation)
+    np.testing.assert_array_equal(plain.flight.u[:50], excited.flight.u[:50])
+    assert excited.flight.u[50, 0] == pytest.approx(plain.flight.u[50, 0] + 3.0)
+    assert excited.flight.x[60, 3] > plain.flight.x[60, 3] + 0.01  # trailing edge up: nose up
+    with pytest.raises(ValueError, match=r"excitation has shape \(20, 1\); expected finite numbers"):
+        PLANT.scenarios.run("none", "none", "quiet", 0, np.zeros((20, 1)))
+
+
+def test_faults_come_at_a_fraction_of_their_size():
+    small = Scenarios(PLANT.scenarios.model, 0.3)
+    for name in PLANT.faults:
+        assert small.fault(name, "hard").magnitude == pytest.approx(0.3 * PLANT.scenarios.fault(name, "hard").magnitude)
+    assert PLANT.stated_faults("quiet", 0.3)["elevator"].description == "15 % of the elevator's effect is lost"
+    assert PLANT.stated_faults("quiet", 0.3)["elevator"].model.uncertainties[-1].bounds == pytest.approx((0.15, 0.15))
+    with pytest.raises(ValueError, match=r"size is 0.0; expected a fraction"):
+        Scenarios(size=0.0)

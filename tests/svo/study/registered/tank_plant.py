@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from polytopes import HPolytope
-from svo.isolation.architectures import ArchitectureI
+from svo.isolation.architectures import ArchitectureI, ArchitectureII
+from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel, Uncertainty
 from svo.observers.window import WindowObserver
@@ -88,3 +89,26 @@ class Tank:
 
 def tank() -> Tank:
     return Tank()
+
+
+@dataclass(frozen=True)
+class TankOfTwoBanks(Tank):
+    """The same tank, whose gauge's observer may start at the detection instead."""
+
+    name: str = "tank2"
+    architecture: str = "I"
+    architectures: tuple[str, ...] = ("I", "II")
+
+    def with_architecture(self, architecture: str) -> TankOfTwoBanks:
+        return replace(self, architecture=architecture)
+
+    def bank(self, noise: str) -> Bank:
+        first = super().bank(noise)
+        if self.architecture == "I":
+            return first
+        faults = {name: first.observers[name] for name in ("leak", "gauge")}
+        return ArchitectureII(first.observers["nominal"], faults, HPolytope.box([0.0], [3.0]), class_one=("leak",))
+
+
+def tank_of_two_banks() -> TankOfTwoBanks:
+    return TankOfTwoBanks()

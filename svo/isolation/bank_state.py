@@ -1,0 +1,81 @@
+"""The state of a bank as named arrays: observers, conclusions, and what observers would start again from.
+
+Names are ``observer.<number>.<name>`` for the arrays of the observers, in the order of the bank, and ``bank.<name>``
+for the rest. Conclusions are JSON in an array of text; nothing is pickled.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo.isolation.logic import LogicState, Tally
+
+if TYPE_CHECKING:
+    from svo.isolation.bank import Bank
+
+State = dict[str, NDArray[Any]]
+_SET = ("A", "b", "C", "d")
+
+
+def saved_state(bank: Bank) -> State:
+    """See `Bank.state_dict`."""
+    for name, observer in bank.observers.items():
+        if not (hasattr(observer, "state_dict") and hasattr(type(observer), "from_state_dict")):
+            raise TypeError(f"observer {name!r} ({type(observer).__name__}) has no state_dict to save")
+    state: State = {
+        f"observer.{i}.{key}": value
+        for i, observer in enumerate(bank.observers.values())
+        for key, value in observer.state_dict().items()  # type: ignore[attr-defined]
+    }
+    conclusions = {"kind": _kind(bank), "sample": bank._sample, "logic": asdict(bank._state)}
+    state["bank.conclusions"] = np.array(json.dumps(conclusions))
+    for key, value in (*bank._latest.arrays().items(), *bank._memory().items()):
+        state[f"bank.{key}"] = value
+    return state
+
+
+def restore_state(bank: Bank, state: Mapping[str, NDArray[Any]]) -> None:
+    """See `Bank.load_state_dict`."""
+    try:
+        conclusions = json.loads(str(state["bank.conclusions"]))
+        if conclusions["kind"] != _kind(bank):
+            raise ValueError(f"it is of {conclusions['kind']}, this bank is {_kind(bank)}")
+        logic = _logic_state(conclusions["logic"])
+        observers = {
+            name: type(observer).from_state_dict(observer.model, _part(state, f"observer.{i}."))  # type: ignore[attr-defined]
+            for i, (name, observer) in enumerate(bank.observers.items())
+        }
+        bank._resume(conclusions["sample"], logic, observers, _part(state, "bank."))
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"state does not belong to this bank: {error}") from error
+
+
+def set_arrays(name: str, P: HPolytope | None) -> State:
+    """A set, or none, as named arrays."""
+    return {} if P is None else {f"{name}.{part}": getattr(P, part) for part in _SET}
+
+
+def set_of(name: str, state: Mapping[str, NDArray[Any]]) -> HPolytope | None:
+    """What `set_arrays` named."""
+    return HPolytope(*(state[f"{name}.{part}"] for part in _SET)) if f"{name}.A" in state else None
+
+
+def _kind(bank: Bank) -> list[str]:
+    """What a state must agree in: architecture, models and options."""
+    return [type(bank).__name__, *bank.observers, repr(bank._logic)]
+
+
+def _part(state: Mapping[str, NDArray[Any]], prefix: str) -> State:
+    return {key.removeprefix(prefix): state[key] for key in state if key.startswith(prefix)}
+
+
+def _logic_state(values: dict[str, Any]) -> LogicState:
+    lists = {key: tuple(values[key]) for key in ("alive", "running", "restart")}
+    return LogicState(**{**values, **lists, "tallies": tuple(Tally(**tally) for tally in values["tallies"])})
