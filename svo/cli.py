@@ -15,7 +15,7 @@ from svo.cli_output import describe, print_checks, print_detection, print_isolab
 if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
     from svo.log import Log
-    from svo.plant import Plant
+    from svo.plant import MonitoredPlant
 
 app = typer.Typer(
     help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
@@ -27,6 +27,12 @@ app = typer.Typer(
 
 PREPARING = "Preparing compiled code (about a minute the first time, then kept)"
 
+DescribedName = Annotated[
+    str, typer.Argument(metavar="PLANT", help="A registered plant, or a TOML file that describes one (my.toml).")
+]
+LogFile = Annotated[
+    Path, typer.Argument(metavar="LOG", help="CSV, Parquet or MAT file with the plant's columns (`svo plants --json`).")
+]
 PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered plant; `svo plants` lists them.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]
 NoiseName = Annotated[
@@ -159,10 +165,8 @@ def simulate(
 
 @app.command()
 def detect(
-    plant: PlantName,
-    log: Annotated[
-        Path, typer.Argument(metavar="LOG", help="CSV file with the plant's columns; see `svo plants --json`.")
-    ],
+    plant: DescribedName,
+    log: LogFile,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl and verdict.json.")] = None,
     noise: NoiseName = None,
     as_json: AsJson = False,
@@ -174,16 +178,17 @@ def detect(
     \b
     Example:
       svo detect eclipse log.csv --out findings
+      svo detect my.toml log.mat --out findings
     """
     with _one_line_errors():
+        from svo.description import find_plant, keep_description
         from svo.detect import detect as run_detection
         from svo.detect import write_detection
         from svo.log_file import read_log
-        from svo.plant import load_plant
         from svo.progress import progress
         from svo.study.configuration import check_noise
 
-        the_plant = load_plant(plant)
+        the_plant = find_plant(plant)
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
@@ -192,6 +197,7 @@ def detect(
             found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
         if out is not None:
             write_detection(out, found)
+            keep_description(the_plant, out)
         if as_json:
             print_json(found.to_dict())
             return
@@ -276,8 +282,8 @@ def distinguish(
 
 @app.command()
 def calibrate(
-    plant: PlantName,
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="CSV file of a flight without faults.")],
+    plant: DescribedName,
+    log: LogFile,
     noise: NoiseName = None,
     as_json: AsJson = False,
 ) -> None:
@@ -291,12 +297,12 @@ def calibrate(
       svo calibrate eclipse log.csv --noise quiet
     """
     with _one_line_errors():
+        from svo.description import find_plant
         from svo.log_calibration import calibrate_log
         from svo.log_file import read_log
-        from svo.plant import load_plant
         from svo.study.configuration import check_noise
 
-        the_plant = load_plant(plant)
+        the_plant = find_plant(plant)
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
@@ -343,17 +349,22 @@ def _checks(path: Path, log: Path | None, full: Path | None) -> list[AlarmCheck]
         return verify_alarms(path, None if log is None else _log_of(path, alarms, log))
     if log is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")
-    from svo.plant import load_plant
     from svo.verification import verify_chains
 
     data = _log_of(path, alarms, full)
-    return [] if data is None else verify_chains(path, data, load_plant(str(alarms[0].source["plant"])))
+    return [] if data is None else verify_chains(path, data, _plant_of(path, alarms))
+
+
+def _plant_of(path: Path, alarms: Sequence[Alarm]) -> MonitoredPlant:
+    """The plant whose model alarms are about; a description lies beside them, where `svo detect` put it."""
+    from svo.description import find_plant
+
+    return find_plant(str(alarms[0].source.get("plant")), path.parent)
 
 
 def _log_of(path: Path, alarms: Sequence[Alarm], log: Path) -> Log | None:
     """The log to compare alarms with, read by the columns of their plant; None if there are no alarms."""
     from svo.log_file import read_log
-    from svo.plant import load_plant
 
     if not alarms:
         return None
@@ -361,11 +372,11 @@ def _log_of(path: Path, alarms: Sequence[Alarm], log: Path) -> Log | None:
         raise ValueError(
             f"{path} has alarms of several runs, and a log is that of one; give the alarms of that run alone"
         )
-    plant = load_plant(str(alarms[0].source.get("plant")))
+    plant = _plant_of(path, alarms)
     return read_log(log, plant.columns, plant.Ts)
 
 
-def _noise(plant: Plant, noise: str | None) -> str:
+def _noise(plant: MonitoredPlant, noise: str | None) -> str:
     return plant.noise_sets[0] if noise is None else noise
 
 

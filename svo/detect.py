@@ -15,7 +15,7 @@ from svo.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
-from svo.plant import Plant
+from svo.plant import MonitoredPlant
 
 Scheduler = Callable[[NDArray[np.float64]], Any]
 
@@ -97,7 +97,7 @@ def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterat
 
 
 def detect(
-    plant: Plant,
+    plant: MonitoredPlant,
     log: Log,
     noise: str,
     *,
@@ -108,7 +108,7 @@ def detect(
 
     Parameters
     ----------
-    plant : Plant
+    plant : MonitoredPlant
     log : Log
         Only time, u and y are used; the plant's own scheduler makes the schedule from y.
     noise : str

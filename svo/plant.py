@@ -48,9 +48,48 @@ class Reference:
     isolate: str
 
 
+class MonitoredPlant(Protocol):
+    """What detection on recorded data needs to know of a plant: a model and the columns, no simulator.
+
+    Attributes
+    ----------
+    name, title : str
+        The key in the registry (or the name of the file that describes it), and one line for people.
+    Ts : float
+        Sampling time [s].
+    noise_sets : tuple of str
+        Names of the noise and disturbance bounds; the first is the default.
+    columns : Columns
+        Names and units of the channels of a log file.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def Ts(self) -> float: ...
+
+    @property
+    def noise_sets(self) -> tuple[str, ...]: ...
+
+    @property
+    def columns(self) -> Columns: ...
+
+    def bank(self, noise: str) -> Bank:
+        """A fresh isolation bank."""
+        ...
+
+    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+        """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
+        ...
+
+
 @runtime_checkable
 class Plant(Protocol):
-    """What a study needs to know of a plant.
+    """What a study needs to know of a plant; every one is a `MonitoredPlant` too.
 
     Attributes
     ----------

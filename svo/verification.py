@@ -10,10 +10,10 @@ import numpy as np
 from svo.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms
 from svo.log import Log
 from svo.observers.chain import chain_of
-from svo.plant import Plant
+from svo.plant import MonitoredPlant
 
 
-def verify_chains(path: str | Path, log: Log, plant: Plant) -> list[AlarmCheck]:
+def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:
     """Check every stored alarm and, if it holds, run its observer over the log again and prove every bound.
 
     The observers are those of the plant's bank for the noise set that the alarm names, so this also checks that
@@ -25,7 +25,7 @@ def verify_chains(path: str | Path, log: Log, plant: Plant) -> list[AlarmCheck]:
         JSON Lines, as `svo.alarms.write_alarms` writes them; all alarms of one run.
     log : Log
         Only time, u and y are used; the plant's own scheduler makes the schedule from y.
-    plant : Plant
+    plant : MonitoredPlant
     """
     checks = verify_alarms(path, log)
     if not all(check.ok for check in checks):
@@ -36,7 +36,7 @@ def verify_chains(path: str | Path, log: Log, plant: Plant) -> list[AlarmCheck]:
     return [_with_chain(check, alarm, known, plant) for check, alarm in zip(checks, read_alarms(path), strict=True)]
 
 
-def _with_chain(check: AlarmCheck, alarm: Alarm, log: Log, plant: Plant) -> AlarmCheck:
+def _with_chain(check: AlarmCheck, alarm: Alarm, log: Log, plant: MonitoredPlant) -> AlarmCheck:
     chain = chain_of(plant.bank(str(alarm.source.get("noise"))), alarm.observer, log)
     seconds = check.seconds + chain.seconds
     if chain.falsified_at != alarm.sample:

@@ -60,9 +60,7 @@ class Bank(ABC):
         steps = {name: observer.update(y0, u=u, schedule=schedule) for name, observer in self._running.items()}
         return self._conclude(0, steps, Sample(None, y0, u, schedule))
 
-    def step(
-        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
-    ) -> Verdict:
+    def step(self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None) -> Verdict:
         """One transition driven by u, then the measurement y; arguments as for the observers.
 
         Raises
@@ -159,8 +157,6 @@ def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[s
     taken = " or ".join(repr(name) for name in reserved)
     if not isinstance(faults, Mapping):
         raise TypeError(f"faults is a {type(faults).__name__}; expected a mapping of fault names to observers")
-    if not faults:
-        raise ValueError("faults is empty; expected at least one fault observer (to detect only, run one observer)")
     for name in faults:
         if not isinstance(name, str) or not name.strip() or name in reserved:
             raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")
