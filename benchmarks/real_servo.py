@@ -93,10 +93,8 @@ def main(arguments: list[str] | None = None) -> None:
         for line in words:
             console.print(line, highlight=False)
         console.print()
-    console.print(
-        f"At 10 ms the fitted g is {pole_at(folder, 10):.3f}: the servo settles within a sample, no pole is left to see.",
-        highlight=False,
-    )
+    slow = f"At 10 ms the fitted g is {pole_at(folder, 10):.3f}: the servo settles within a sample."
+    console.print(slow, highlight=False)
     console.print("The recordings are real and healthy; jams and runaways are injected into them.", highlight=False)
     if options.figure:
         draw(folder, options.figure)

@@ -207,6 +207,56 @@ def detect(
 
 
 @app.command()
+def watch(
+    plant: DescribedName,
+    log: Annotated[str, typer.Argument(metavar="LOG", help="CSV file that is being written, or - for standard input.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl, written as they are raised.")
+    ] = None,
+    noise: NoiseName = None,
+    until_end: Annotated[
+        bool, typer.Option("--until-end", help="End where the file ends, instead of waiting for more.")
+    ] = False,
+) -> None:
+    """Show live what a plant's isolation bank says about a log that is still growing.
+
+    Which models are alive, bounds of each state by each of them, and each alarm with its certificate. In a terminal a
+    table, elsewhere plain lines. Ctrl-C ends it; standard input ends it too. The exit code is then 0.
+
+    \b
+    Example:
+      svo watch eclipse log.csv --out findings
+      logger | svo watch my.toml -
+    """
+    with _one_line_errors():
+        from functools import partial
+
+        from svo.alarms import append_alarm, write_alarms
+        from svo.cli_output import console
+        from svo.description import find_plant, keep_description
+        from svo.study.configuration import check_noise
+        from svo.watch.lines import lines_of
+        from svo.watch.session import Session
+        from svo.watch.view import view_of
+        from svo.watch.watch import watch as run_watch
+
+        the_plant = find_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        lines = lines_of(log, until_end)
+        session = Session(the_plant, noise, lines.name)
+        keep = None
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            write_alarms(out / "alarms.jsonl", [])
+            keep_description(the_plant, out)
+            keep = partial(append_alarm, out / "alarms.jsonl")
+        _announce(PREPARING)
+        session.warm_up()
+        run_watch(lines, session, view_of(console(), session), keep=keep)
+
+
+@app.command()
 def verify(
     alarms: Annotated[Path, typer.Argument(metavar="ALARMS", help="An alarms.jsonl of `svo study` or `svo detect`.")],
     log: Annotated[
