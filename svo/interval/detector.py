@@ -130,6 +130,7 @@ class IntervalDetector:
         self.predictor, self.noise, self.pole = predictor, noise, float(pole)
         self._thresholds = noise.thresholds(pole)
         self._tau: list[float] = self._thresholds.tolist()
+        self._started = False
         self._forget()
 
     def reset(self, center: float, radius: float) -> None:
@@ -217,7 +218,7 @@ class IntervalDetector:
     # -- inside ----------------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._started: bool = False
+        self._started = False
         self._held = self.predictor.interval.center
         self._schedule: Any = None
         self._counted = -1  # measurements so far, less one
