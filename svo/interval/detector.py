@@ -242,7 +242,7 @@ class IntervalDetector:
 
 
 def _number(name: str, value: Any) -> float:
-    if type(value) is not float:
+    if not isinstance(value, float):
         array = np.asarray(value, dtype=float)
         if array.size != 1:
             raise ValueError(f"{name} has shape {array.shape}; expected one number")
@@ -253,7 +253,7 @@ def _number(name: str, value: Any) -> float:
 
 
 def _measurement(y: Any) -> float:
-    if type(y) is not float:
+    if not isinstance(y, float):
         array = np.asarray(y, dtype=float)
         if array.size != 1:
             raise ValueError(f"y has shape {array.shape}; expected one number, NaN if it is missing")
