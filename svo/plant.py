@@ -7,10 +7,10 @@ points of its distribution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,11 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
+
 HEALTHY = "none"
+Distribution = Literal["bounded", "gaussian"]
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,28 @@ class StatesFaults(Protocol):
 
     def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
         """Each fault at the size of its first profile, with the bounds of a noise set."""
+        ...
+
+
+@runtime_checkable
+class ComparesDetectors(Protocol):
+    """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.
+
+    Attributes
+    ----------
+    compared_faults : tuple of (fault, profile)
+        The scenarios of the comparison.
+    """
+
+    compared_faults: tuple[tuple[str, str], ...]
+
+    def with_noise(self, distribution: Distribution) -> Plant:
+        """This plant with its noise drawn "bounded" (within the bounds of the noise set), or "gaussian" (the same
+        rms, unbounded); models and bounds stay as they are."""
+        ...
+
+    def detectors(self, noise: str) -> Sequence[Detector]:
+        """The detectors to compare with one noise set; their names differ."""
         ...
 
 
