@@ -7,10 +7,10 @@ points of its distribution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,11 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
+
 HEALTHY = "none"
+Distribution = Literal["bounded", "gaussian"]
 
 
 @runtime_checkable
@@ -155,6 +159,28 @@ def fault_start(plant: Plant, fault: str, profile: str) -> float:
     if fault != HEALTHY and isinstance(plant, TimesFaults):
         return plant.fault_start(fault, profile)
     return plant.fault_time
+
+
+@runtime_checkable
+class ComparesDetectors(Protocol):
+    """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.
+
+    Attributes
+    ----------
+    compared_faults : tuple of (fault, profile)
+        The scenarios of the comparison.
+    """
+
+    compared_faults: tuple[tuple[str, str], ...]
+
+    def with_noise(self, distribution: Distribution) -> Plant:
+        """This plant with its noise drawn "bounded" (within the bounds of the noise set), or "gaussian" (the same
+        rms, unbounded); models and bounds stay as they are."""
+        ...
+
+    def detectors(self, noise: str) -> Sequence[Detector]:
+        """The detectors to compare with one noise set; their names differ."""
+        ...
 
 
 def registered_plants() -> dict[str, Callable[[], Plant]]:

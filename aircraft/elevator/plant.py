@@ -13,6 +13,7 @@ from aircraft.elevator.gains import ServoGains
 from aircraft.elevator.scenarios import COMMANDS, DURATION, SCENARIOS, TRAVEL, TS, Scenario, SensorNoise
 from aircraft.elevator.servo import Servo
 from polytopes import HPolytope
+from svo.faults import ActuatorFault
 from svo.interval import (
     FirstOrderScheduler,
     IntervalDetector,
@@ -129,8 +130,8 @@ class Elevator:
     def models(self, noise: str) -> dict[str, UncertainModel]:
         """The observers' models: "nominal", then one for each fault, which contains the healthy servo-loop."""
         nominal = first_order_model(self._bound(noise), self.Ts)
-        largest = {fault: self._scenario(fault, profiles[0]) for fault, profiles in self.faults.items()}
-        return {"nominal": nominal} | {name: s.fault.model(nominal) for name, s in largest.items()}
+        faults = {name: self._scenario(name, profiles[0]).fault for name, profiles in self.faults.items()}
+        return {"nominal": nominal} | {name: _beyond_the_stops(f).model(nominal) for name, f in faults.items()}
 
     def predictor(self, first_command: float) -> IntervalPredictor:
         """Interval predictor of a servo-loop that starts at rest, within 2 mrad of its first command."""
@@ -180,6 +181,11 @@ class Elevator:
         log = Log(time=time, u=u[:, None], y=y[:, None], x=x[:, None])
         scheduled = first_order_schedule(self.predictor(float(u[0])).predict(log))
         return replace(log, schedule=scheduled.schedule)
+
+
+def _beyond_the_stops(fault: ActuatorFault) -> ActuatorFault:
+    """A surface that is driven against its stop arrives at a speed which no command within the travel explains."""
+    return fault if fault.travel is None else replace(fault, travel=tuple(1.2 * limit for limit in fault.travel))
 
 
 def elevator() -> Elevator:
