@@ -142,7 +142,7 @@ def simulate(
     """
     with _one_line_errors():
         from svo.log_file import write_log
-        from svo.plant import HEALTHY, load_plant
+        from svo.plant import HEALTHY, fault_start, load_plant
         from svo.study.configuration import check_fault, check_noise
 
         the_plant = load_plant(plant)
@@ -159,7 +159,8 @@ def simulate(
             profile = profile or the_plant.faults[fault][0]
         log = the_plant.simulate(fault, profile, noise, seed)
         write_log(out, log, the_plant.columns)
-        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {the_plant.fault_time:g} s"
+        start = fault_start(the_plant, fault, profile)
+        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {start:g} s"
         typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
 
 

@@ -7,10 +7,10 @@ points of its distribution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,28 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
+
 HEALTHY = "none"
+Distribution = Literal["bounded", "gaussian"]
+
+
+@runtime_checkable
+class InputScheduler(Protocol):
+    """A causal scheduling filter that needs the input of each sample beside its measurement."""
+
+    def with_input(self, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
+        """The schedule of a sample from its y (ny,) and u (nu,); called with each sample in turn."""
+        ...
+
+
+Scheduler = Callable[[NDArray[np.float64]], Any] | InputScheduler
+
+
+def schedule_of(scheduler: Scheduler, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
+    """The schedule of the next sample, by a filter of either kind."""
+    return scheduler.with_input(y, u) if isinstance(scheduler, InputScheduler) else scheduler(y)
 
 
 @dataclass(frozen=True)
@@ -82,7 +103,7 @@ class MonitoredPlant(Protocol):
         """A fresh isolation bank."""
         ...
 
-    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+    def scheduler(self) -> Scheduler:
         """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
         ...
 
@@ -133,7 +154,7 @@ class Plant(Protocol):
         """A fresh isolation bank; its fault observers are named as in `faults`."""
         ...
 
-    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+    def scheduler(self) -> Scheduler:
         """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
         ...
 
@@ -160,6 +181,44 @@ class StatesFaults(Protocol):
 
     def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
         """Each fault at the size of its first profile, with the bounds of a noise set."""
+        ...
+
+
+@runtime_checkable
+class TimesFaults(Protocol):
+    """What a `Plant` offers besides if its faults do not all begin at `fault_time`."""
+
+    def fault_start(self, fault: str, profile: str) -> float:
+        """Time of the first faulty sample of a fault and profile [s]."""
+        ...
+
+
+def fault_start(plant: Plant, fault: str, profile: str) -> float:
+    """Time of the first faulty sample of a fault and profile [s]; the plant's `fault_time` without a fault."""
+    if fault != HEALTHY and isinstance(plant, TimesFaults):
+        return plant.fault_start(fault, profile)
+    return plant.fault_time
+
+
+@runtime_checkable
+class ComparesDetectors(Protocol):
+    """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.
+
+    Attributes
+    ----------
+    compared_faults : tuple of (fault, profile)
+        The scenarios of the comparison.
+    """
+
+    compared_faults: tuple[tuple[str, str], ...]
+
+    def with_noise(self, distribution: Distribution) -> Plant:
+        """This plant with its noise drawn "bounded" (within the bounds of the noise set), or "gaussian" (the same
+        rms, unbounded); models and bounds stay as they are."""
+        ...
+
+    def detectors(self, noise: str) -> Sequence[Detector]:
+        """The detectors to compare with one noise set; their names differ."""
         ...
 
 

@@ -6,7 +6,7 @@ set-membership detection.
 
 from svo.interval.bounds import GainBounds, GainLaw
 from svo.interval.detector import IntervalDetector, IntervalRecord, IntervalStep, ThresholdVerdict
-from svo.interval.model import first_order_model, first_order_schedule
+from svo.interval.model import FirstOrderScheduler, first_order_model, first_order_schedule
 from svo.interval.noise import CharacterizationCheck, NoiseCharacterization
 from svo.interval.power_law import PowerLaw
 from svo.interval.predictor import Interval, IntervalPrediction, IntervalPredictor
@@ -15,6 +15,7 @@ from svo.interval.thresholds import filter_bound, threshold_sequence
 
 __all__ = [
     "CharacterizationCheck",
+    "FirstOrderScheduler",
     "GainBounds",
     "GainLaw",
     "Interval",

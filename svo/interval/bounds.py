@@ -44,7 +44,7 @@ class GainBounds:
         samples = None
         for name, lowest, highest in _RANGES:
             value = getattr(self, name)
-            if type(value) is float:  # online, where a sample takes some microseconds
+            if isinstance(value, float):  # online, where a sample takes some microseconds
                 if not lowest <= value <= highest:
                     raise ValueError(_message(name, value, lowest))
                 continue

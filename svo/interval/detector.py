@@ -130,6 +130,7 @@ class IntervalDetector:
         self.predictor, self.noise, self.pole = predictor, noise, float(pole)
         self._thresholds = noise.thresholds(pole)
         self._tau: list[float] = self._thresholds.tolist()
+        self._started = False
         self._forget()
 
     def reset(self, center: float, radius: float) -> None:
@@ -217,7 +218,7 @@ class IntervalDetector:
     # -- inside ----------------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._started: bool = False
+        self._started = False
         self._held = self.predictor.interval.center
         self._schedule: Any = None
         self._counted = -1  # measurements so far, less one
@@ -241,7 +242,7 @@ class IntervalDetector:
 
 
 def _number(name: str, value: Any) -> float:
-    if type(value) is not float:
+    if not isinstance(value, float):
         array = np.asarray(value, dtype=float)
         if array.size != 1:
             raise ValueError(f"{name} has shape {array.shape}; expected one number")
@@ -252,7 +253,7 @@ def _number(name: str, value: Any) -> float:
 
 
 def _measurement(y: Any) -> float:
-    if type(y) is not float:
+    if not isinstance(y, float):
         array = np.asarray(y, dtype=float)
         if array.size != 1:
             raise ValueError(f"y has shape {array.shape}; expected one number, NaN if it is missing")

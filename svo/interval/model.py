@@ -7,12 +7,13 @@ observer of this model, which also uses the measurements, stays inside the predi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.interval.predictor import IntervalPrediction
+from svo.interval.predictor import IntervalPrediction, IntervalPredictor
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.uncertainty import Uncertainty
@@ -54,3 +55,30 @@ def first_order_schedule(prediction: IntervalPrediction) -> Log:
     spread = (np.abs(1 - p.gc) + p.gr) * p.hr * np.abs(p.u)
     schedule: Any = np.column_stack([p.gc, p.gr, p.hc, spread])
     return Log(time=p.time, u=p.u[:, None], y=p.y[:, None], schedule=schedule)
+
+
+class FirstOrderScheduler:
+    """The schedule of `first_order_model` sample by sample, by a predictor that runs along (a `svo.plant.Scheduler`).
+
+    Parameters
+    ----------
+    predictor : function of the first command
+        Gives the predictor, once the first sample is there.
+    """
+
+    def __init__(self, predictor: Callable[[float], IntervalPredictor]) -> None:
+        self._make = predictor
+        self._predictor: IntervalPredictor | None = None
+        self._held = 0.0
+
+    def with_input(self, y: Array, u: Array) -> Array:
+        """gc, gr, hc and spread (4,) of the transition that starts at this sample, from its y (1,) and u (1,)."""
+        command, measured = float(u[0]), float(y[0])
+        if self._predictor is None:
+            self._predictor = self._make(command)
+            self._held = self._predictor.interval.center
+        if not np.isnan(measured):
+            self._held = measured
+        _, bounds = self._predictor.transition(command, self._held)
+        gc, gr, hc, hr = (float(getattr(bounds, name)) for name in ("gc", "gr", "hc", "hr"))
+        return np.array([gc, gr, hc, (abs(1 - gc) + gr) * hr * abs(command)])

@@ -14,7 +14,7 @@ from svo.interval.thresholds import checked_bounds, threshold_sequence
 
 Array = NDArray[np.float64]
 
-_BLOCK = 8192  # samples whose partial sums are made at once: they stay in the cache, and short sums round little
+_BLOCK = 4096  # samples whose partial sums are made at once: they stay in the cache, and short sums round little
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ class NoiseCharacterization:
 def moving_average_extremes(signals: Sequence[Array], qbar: int) -> Array:
     """Largest |mean over q samples| in all signals, (qbar,); NaN where no signal has q samples.
 
-    Time O(n qbar), vectorised by the compiler over q; rounding stays at some 1e-13 of the largest sample.
+    Time O(n qbar), vectorised by the compiler over q; rounding stays at some 1e-12 of the largest sample.
     """
     best = np.zeros(qbar)
     for signal in signals:
@@ -146,9 +146,10 @@ def moving_average_extremes(signals: Sequence[Array], qbar: int) -> Array:
 
 
 def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
-    single = isinstance(records, np.ndarray) and records.ndim == 1 and records.dtype != object
+    several: Sequence[ArrayLike] = records  # type: ignore[assignment]
+    single = len(several) > 0 and np.ndim(several[0]) == 0
     found = []
-    for i, record in enumerate([records] if single else records):  # type: ignore[arg-type]
+    for i, record in enumerate([records] if single else several):
         signal = np.asarray(record, dtype=float)
         if signal.ndim != 1:
             raise ValueError(f"record {i} has shape {signal.shape}; expected (n,), or a sequence of such records")

@@ -142,6 +142,15 @@ class IntervalPredictor:
         ValueError
             If u is not finite, or the stability condition (17) fails. The predictor is unchanged.
         """
+        self._advance(u, y, schedule)
+        return self._interval
+
+    def transition(self, u: float, y: float | None = None, schedule: Any = None) -> tuple[Interval, GainBounds]:
+        """As `step`, and also the bounds of g and h that were used, with the radius of g worked out."""
+        gains, used = self._advance(u, y, schedule)
+        return self._interval, GainBounds(gains.gc, used, gains.hc, gains.hr)
+
+    def _advance(self, u: float, y: float | None, schedule: Any) -> tuple[GainBounds, float]:
         if not -np.inf < u < np.inf:
             raise ValueError(f"u is {u} at sample {self._sample}; expected a finite number")
         gains = self.gains if isinstance(self.gains, GainBounds) else self._bounds(u, y, schedule)
@@ -154,7 +163,7 @@ class IntervalPredictor:
             raise ValueError(_unstable(self._sample, float(gains.gc), used))
         self._interval = Interval(center, radius)
         self._sample += 1
-        return self._interval
+        return gains, used
 
     def predict(self, log: Log, initial: tuple[float, float] | None = None) -> IntervalPrediction:
         """The prediction over a log with one input and one output; `step` and its sample are left alone.

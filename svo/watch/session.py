@@ -15,7 +15,7 @@ from svo.alarms import Alarm
 from svo.isolation.record import Verdict
 from svo.log_columns import is_sampled, wrong_step
 from svo.log_csv import RowParser, csv_errors
-from svo.plant import MonitoredPlant
+from svo.plant import MonitoredPlant, schedule_of
 
 Array = NDArray[np.float64]
 
@@ -125,13 +125,14 @@ class Session:
         time, n_inputs = float(row[0]), len(self.plant.columns.inputs)
         u = row[1 : 1 + n_inputs]
         y = row[1 + n_inputs : 1 + n_inputs + len(self.plant.columns.outputs)]
+        if self._held is not None and not is_sampled(self._time, time, self.plant.Ts):
+            where = f"{self.source}, line {self._line}, column {self.plant.columns.time!r}"
+            raise wrong_step(where, self._time, time, self.plant.Ts)
+        schedule = schedule_of(self._scheduler, y, u)
         if self._held is None:
-            verdict = self._bank.update(y, u=u, schedule=self._scheduler(y))
+            verdict = self._bank.update(y, u=u, schedule=schedule)
         else:
-            if not is_sampled(self._time, time, self.plant.Ts):
-                where = f"{self.source}, line {self._line}, column {self.plant.columns.time!r}"
-                raise wrong_step(where, self._time, time, self.plant.Ts)
-            verdict = self._bank.step(self._held, y, u_next=u, schedule=self._scheduler(y))
+            verdict = self._bank.step(self._held, y, u_next=u, schedule=schedule)
         self._held, self._time, self._verdict = u, time, verdict
         self._samples += 1
         self._undecided += sum(step.verdict == "undecided" for step in verdict.steps.values())

@@ -121,13 +121,14 @@ class LiveView:
         return Text(f"{status.time:.3f} s  {conclusion(status)}", style=f"bold {style}")
 
     def _table(self, status: Status) -> RenderableType:
+        from rich.markup import escape
         from rich.table import Table
 
         table = Table()
         table.add_column("model")
-        table.add_column("")
+        table.add_column("status")
         for name in self._session.states:
-            table.add_column(name, justify="right", no_wrap=True)
+            table.add_column(escape(name), justify="right", no_wrap=True)
         for name in self._session.names:
             table.add_row(*self._row(name, status))
         return table
