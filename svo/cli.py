@@ -186,6 +186,7 @@ def detect(
         from svo.detect import detect as run_detection
         from svo.detect import write_detection
         from svo.log_file import read_log
+        from svo.plant import DetectsThresholds
         from svo.progress import progress
         from svo.study.configuration import check_noise
 
@@ -196,13 +197,17 @@ def detect(
         _announce(PREPARING)
         with progress("Samples") as update:
             found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
+        crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
+        beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
         if out is not None:
-            write_detection(out, found)
+            write_detection(out, found, beside)
             keep_description(the_plant, out)
         if as_json:
-            print_json(found.to_dict())
+            print_json(found.to_dict() | beside)
             return
         print_detection(found)
+        if crossings is not None:
+            typer.echo(crossings.to_text())
         if out is not None:
             typer.echo(f"Alarms with certificates: {out / 'alarms.jsonl'}")
 

@@ -134,8 +134,12 @@ def alarms_of(record: BankRecord, log: Log, source: Mapping[str, str | int | flo
     return tuple(Alarm(name, k, float(log.time[k]), record.certificates[name], source) for k, name in died)
 
 
-def write_detection(folder: Path, detection: Detection) -> None:
-    """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be."""
+def write_detection(folder: Path, detection: Detection, beside: Mapping[str, Any] | None = None) -> None:
+    """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be.
+
+    ``beside`` is added to verdict.json: what detectors without certificates say, by name.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     write_alarms(folder / "alarms.jsonl", detection.alarms)
-    (folder / "verdict.json").write_text(json.dumps(detection.to_dict(), indent=2) + "\n", encoding="utf-8")
+    verdict = {**detection.to_dict(), **(beside or {})}
+    (folder / "verdict.json").write_text(json.dumps(verdict, indent=2) + "\n", encoding="utf-8")

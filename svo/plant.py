@@ -21,6 +21,7 @@ from svo.model import UncertainModel
 
 if TYPE_CHECKING:
     from svo.comparison.detector import Detector
+    from svo.interval.on_log import ThresholdDetection
 
 HEALTHY = "none"
 Distribution = Literal["bounded", "gaussian"]
@@ -181,6 +182,15 @@ class StatesFaults(Protocol):
 
     def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
         """Each fault at the size of its first profile, with the bounds of a noise set."""
+        ...
+
+
+@runtime_checkable
+class DetectsThresholds(Protocol):
+    """What a `MonitoredPlant` offers besides if an interval detector runs beside its bank."""
+
+    def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
+        """What that detector says about a log; None if there is none after all."""
         ...
 
 

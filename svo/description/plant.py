@@ -12,15 +12,18 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.description.faults import FaultModel, faults_of
+from svo.description.interval import IntervalSettings, interval_settings
 from svo.description.model import box_of, model_file, model_of
 from svo.description.table import Table, read_table
+from svo.interval.on_log import ThresholdDetection, detect_thresholds
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
+from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
 from svo.plant import Column, Columns
 
-_TOP = ("title", "Ts", "columns", "model", "initial", "observer", "faults", "global", "bank")
+_TOP = ("title", "Ts", "columns", "model", "initial", "observer", "faults", "global", "bank", "interval_detector")
 STATED = "stated"
 
 
@@ -55,6 +58,8 @@ class DescribedPlant:
         Any of debounce, recovery and timeout.
     files : tuple of path
         The files that describe the plant.
+    interval : IntervalSettings or None
+        An interval detector to run beside the bank.
     """
 
     name: str
@@ -67,6 +72,7 @@ class DescribedPlant:
     global_set: HPolytope | None
     bank_options: Mapping[str, int]
     files: tuple[Path, ...]
+    interval: IntervalSettings | None = None
     noise_sets: tuple[str, ...] = (STATED,)
 
     @property
@@ -94,6 +100,12 @@ class DescribedPlant:
     def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
         """A described model has no schedule."""
         return lambda y: None
+
+    def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
+        """What the interval detector says about a log; None if there is none in the file."""
+        if self.interval is None:
+            return None
+        return detect_thresholds(*self.interval.detector(log, self.columns, self.Ts))
 
     def _observer(self, model: UncertainModel) -> WindowObserver:
         return WindowObserver(model, self.initial, horizon=self.observer.horizon, template=self.observer.template)
@@ -127,6 +139,7 @@ def read_description(path: str | Path) -> DescribedPlant:
         global_set=box_of(top.table("global"), model.n_states) if "global" in top else None,
         bank_options=_bank_options(top),
         files=_files(path, top.table("model")),
+        interval=interval_settings(top, columns),
     )
 
 

@@ -50,7 +50,7 @@ def test_plants_are_listed_with_what_they_have(registered_tank: str) -> None:
     assert every["eclipse"]["Ts"] == 0.01
 
 
-@pytest.mark.parametrize("command", ["plants", "study", "simulate", "detect", "verify"])
+@pytest.mark.parametrize("command", ["plants", "study", "simulate", "detect", "watch", "verify"])
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = svo(command, "--help")
     assert result.exit_code == 0
