@@ -44,7 +44,8 @@ class Outcome:
         Seconds from the first faulty sample to the first alarm that the healthy run does not have there, plus one
         sampling time; Inf if there is none in the time given.
     microseconds : float
-        Per sample, on the healthy log.
+        Per sample, on the healthy log: the quickest of five runs of the interval detector, and the median over the
+        observer's samples.
     """
 
     alarm_share: float
@@ -72,14 +73,18 @@ def run_interval(
 ) -> Outcome:
     """Alarms on a healthy log, and delays of faults injected into it at each of the instants (samples)."""
     detector.warm_up()
-    begun = perf_counter()
-    calm = detector.run(healthy).exceeded
-    seconds = perf_counter() - begun
+    calm, seconds = detector.run(healthy).exceeded, min(_seconds_of(detector, healthy) for _ in range(5))
     delays = {
         name: np.array([_first(detector.run(fault(healthy, k)).exceeded & ~calm, k) for k in instants])
         for name, fault in faults.items()
     }
     return Outcome(float(calm.mean()), delays, 1e6 * seconds / len(healthy))
+
+
+def _seconds_of(detector: IntervalDetector, log: Log) -> float:
+    begun = perf_counter()
+    detector.run(log)
+    return perf_counter() - begun
 
 
 def _first(alarm: NDArray[np.bool_], instant: int) -> float:
@@ -109,12 +114,12 @@ def run_observer(
     """The same as `run_interval` for a set-valued observer; it starts again from a wide set after a falsification."""
     log = first_order_schedule(predictor(fit, healthy).predict(healthy))
     observer = _observer(noise, log, horizon)
-    model, calm, at, seconds = observer.model, set(), {}, 0.0
+    model, calm, at, seconds = observer.model, set(), {}, []
     for k in range(len(log)):
         if k in instants:
             at[k] = observer.state_dict()
         step = _advance(observer, log, k)
-        seconds += step.seconds
+        seconds.append(step.seconds)
         if step.verdict == "falsified":
             calm.add(k)
             _start_again(observer, log, k)
@@ -122,7 +127,7 @@ def run_observer(
         name: np.array([_delay(WindowObserver.from_state_dict(model, at[k]), log, fault, k, calm) for k in instants])
         for name, fault in faults.items()
     }
-    return Outcome(len(calm) / len(log), delays, 1e6 * seconds / len(log))
+    return Outcome(len(calm) / len(log), delays, 1e6 * float(np.median(seconds)))
 
 
 def _observer(noise: float, log: Log, horizon: int) -> WindowObserver:

@@ -34,7 +34,7 @@ def draw(folder: Path, path: Path) -> None:
     near = running.time[JAM]
     jammed.set(xlim=(near - 0.02, near + 0.02), ylim=(-0.2, 0.6))
     pulses.set_ylim(-0.12, 0.24)
-    figure.savefig(path, dpi=150)
+    figure.savefig(path, dpi=100)
 
 
 def _draw_position(ax: Any, healthy: Log, faulty: Log) -> None:

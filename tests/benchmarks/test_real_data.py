@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from benchmarks._servo_detectors import learn, predictor, run_interval
 from benchmarks._servo_records import COLUMNS, VARIABLE, Ts, data_folder, halves, jam, part, record, runaway
 from benchmarks.real_flight import LEARN, angle, between, failure_time, main
 from benchmarks.real_servo import FAULTS, INSTANTS, pole_at
+from svo.cli import app
 from svo.interval import IntervalDetector
 from svo.log import Log
 
 FOLDER = data_folder()
+SERVO = Path(__file__).parents[2] / "docs" / "examples" / "servo.toml"
 needs_data = pytest.mark.skipif(FOLDER is None, reason=f"{VARIABLE} is not set: no recorded data")
 
 
@@ -53,6 +59,17 @@ def test_a_real_flight_passes_through_the_tools(capsys: pytest.CaptureFixture[st
     assert len(between(roll, *LEARN)) == pytest.approx(1000, abs=2)
     main()
     assert "roll" in capsys.readouterr().out
+
+
+@needs_data
+def test_the_described_servo_explains_the_healthy_recording_from_the_command_line() -> None:
+    assert FOLDER is not None
+    recording = str(FOLDER / "emps" / "DATA_EMPS.mat")
+    done = CliRunner().invoke(app, ["detect", str(SERVO), recording, "--json"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert (found["state"], found["samples"]) == ("nominal", 24841)
+    assert found["interval_detector"]["samples_beyond"] == 0
 
 
 def test_without_data_the_study_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
