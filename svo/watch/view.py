@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf
 from time import monotonic
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
 
 from svo.alarms import Alarm
 from svo.watch.session import Session, Status
 
-if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
-
 SECONDS_BETWEEN_PICTURES = 0.1
 SECONDS_BETWEEN_LINES = 1.0
 SHOWN_ALARMS = 6
+_ANY_WIDTH = 10_000
 
 
 class View(Protocol):
@@ -73,8 +76,6 @@ class LiveView:
     """A table that is drawn again ten times a second; it stays on the screen at the end."""
 
     def __init__(self, console: Console, session: Session) -> None:
-        from rich.live import Live
-
         self._console, self._session = console, session
         self._alarms: list[str] = []
         self._drawn = monotonic()
@@ -96,12 +97,8 @@ class LiveView:
         self._console.print(summary(status, why), highlight=False, markup=False)
 
     def _picture(self, status: Status | None, waiting: int) -> RenderableType:
-        from rich.console import Group
-        from rich.markup import escape
-        from rich.text import Text
-
         session = self._session
-        title = Text.from_markup(f"[bold]{escape(session.plant.title)}[/] ({session.noise} noise), {session.source}")
+        title = Text.assemble((session.plant.title, "bold"), f" ({session.noise} noise), {session.source}")
         if status is None:
             return Group(title, Text("waiting for the first sample; Ctrl-C ends", style="dim"))
         load = 100 * status.seconds_per_sample / session.plant.Ts
@@ -112,38 +109,51 @@ class LiveView:
         shown = [Text(text, style="red") for text in self._alarms[-SHOWN_ALARMS:]]
         if len(self._alarms) > SHOWN_ALARMS:
             shown.insert(0, Text(f"{len(self._alarms) - SHOWN_ALARMS} earlier alarms are not shown", style="dim"))
-        return Group(title, self._headline(status), self._table(status), *shown, Text(foot, style="dim"))
+        return Group(title, self._headline(status), *self._tables(status), *shown, Text(foot, style="dim"))
 
     def _headline(self, status: Status) -> RenderableType:
-        from rich.text import Text
-
         style = {"nominal": "green", "detected": "yellow", "isolated": "red"}.get(status.verdict.state, "magenta")
         return Text(f"{status.time:.3f} s  {conclusion(status)}", style=f"bold {style}")
 
-    def _table(self, status: Status) -> RenderableType:
-        from rich.markup import escape
-        from rich.table import Table
+    def _tables(self, status: Status) -> list[RenderableType]:
+        """Bounds by every model beside it where the terminal is wide enough, else by the first one alive, below."""
+        wide = self._models(status, self._session.states)
+        unlimited = self._console.options.update_width(_ANY_WIDTH)
+        if self._console.measure(wide, options=unlimited).maximum <= self._console.width:
+            return [wide]
+        return [self._models(status, ()), *self._bounds(status)]
 
-        table = Table()
-        table.add_column("model")
-        table.add_column("status")
-        for name in self._session.states:
-            table.add_column(escape(name), justify="right", no_wrap=True)
+    def _models(self, status: Status, states: Sequence[str]) -> Table:
+        table = _table("model", "status", *states)
         for name in self._session.names:
-            table.add_row(*self._row(name, status))
+            # The models of faults may have states of their own after the plant's.
+            bounds = zip(*status.boxes[name], strict=True) if name in status.boxes else ()
+            cells = [_interval(low, high) for low, high in bounds][: len(states)]
+            table.add_row(Text(name), self._life(name, status), *(Text(cell) for cell in cells))
         return table
 
-    def _row(self, name: str, status: Status) -> list[str]:
-        from rich.markup import escape
+    def _bounds(self, status: Status) -> list[Table]:
+        if not status.boxes:
+            return []
+        name, (lower, upper) = next(iter(status.boxes.items()))
+        table = _table("state", f"bounds by {name}")
+        for state, low, high in zip(self._session.states, lower, upper, strict=False):
+            table.add_row(Text(state), Text(_interval(low, high)))
+        return [table]
 
-        empty = [""] * len(self._session.states)
-        if name in status.boxes:
-            # The models of faults may have states of their own after the plant's.
-            bounds = list(zip(*status.boxes[name], strict=True))[: len(empty)]
-            return [escape(name), "[green]alive[/]", *(escape(_interval(low, high)) for low, high in bounds)]
-        if name in status.dead:
-            return [escape(name), f"[red]falsified at {status.dead[name].time:g} s[/]", *empty]
-        return [escape(name), "alive" if name in status.verdict.alive else "[red]falsified[/]", *empty]
+    def _life(self, name: str, status: Status) -> Text:
+        if name in status.verdict.alive:
+            return Text("alive", style="green")
+        when = f" at {status.dead[name].time:g} s" if name in status.dead else ""
+        return Text(f"falsified{when}", style="red")
+
+
+def _table(*columns: str) -> Table:
+    """Columns of numbers to the right, after two of words."""
+    table = Table()
+    for i, name in enumerate(columns):
+        table.add_column(Text(name), justify="left" if i < 2 else "right", no_wrap=True)
+    return table
 
 
 def conclusion(status: Status) -> str:

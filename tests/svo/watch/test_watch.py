@@ -159,6 +159,17 @@ def test_in_a_terminal_there_is_a_table_with_models_units_and_alarms() -> None:
     assert isinstance(view_of(Console(file=io.StringIO()), session), PlainView)
 
 
+def test_a_narrow_terminal_shows_the_bounds_below_the_models() -> None:
+    screen = io.StringIO()
+    session, _ = session_over(LOG.read_text().splitlines())
+    view = LiveView(Console(file=screen, force_terminal=True, width=50, color_system=None), session)
+    view.close(session.status(), "End")
+    shown = screen.getvalue()
+    for words in ("falsified at 5 s", "bounds by sensor", "true_speed [m/s]", "[-0.9714, 1.327]"):
+        assert words in shown
+    assert "…" not in shown
+
+
 def test_at_100_hz_it_does_not_fall_behind() -> None:
     """Another process writes a flight of the Eclipse; the lag goes from its clock to ours."""
     live = follow(300, terminal=False)
