@@ -185,7 +185,7 @@ class Elevator:
 
 def _beyond_the_stops(fault: ActuatorFault) -> ActuatorFault:
     """A surface that is driven against its stop arrives at a speed which no command within the travel explains."""
-    return fault if fault.travel is None else replace(fault, travel=tuple(1.2 * limit for limit in fault.travel))
+    return fault if fault.travel is None else replace(fault, travel=(1.2 * TRAVEL[0], 1.2 * TRAVEL[1]))
 
 
 def elevator() -> Elevator:
