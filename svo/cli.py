@@ -10,12 +10,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from svo.cli_output import describe, print_checks, print_detection, print_isolability, print_json, print_study
+from svo.cli_output import (
+    describe,
+    print_checks,
+    print_comparison,
+    print_detection,
+    print_detector_study,
+    print_isolability,
+    print_json,
+    print_study,
+)
 
 if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
     from svo.log import Log
-    from svo.plant import MonitoredPlant
+    from svo.plant import MonitoredPlant, Plant
+    from svo.study.configuration import StudyConfiguration
 
 app = typer.Typer(
     help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
@@ -88,14 +98,17 @@ def study(
 ) -> None:
     """Measure times to detect and to isolate over many simulated runs.
 
-    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html.
+    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html. A plant with
+    interval detectors (elevator) is studied with these, each learnt anew in every run.
 
     \b
     Example:
       svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
+      svo study elevator --runs 200 --seed 0 --out results
     """
     with _one_line_errors():
         _need_study_extra()
+        from svo.interval.study import LearnsDetectors
         from svo.plant import load_plant
         from svo.progress import progress
         from svo.study.configuration import StudyConfiguration
@@ -108,6 +121,9 @@ def study(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or ()
         )
         StudyFolder(out).check(configuration, resume)
+        if isinstance(the_plant, LearnsDetectors):
+            _study_detectors(the_plant, configuration, out, workers, resume, as_json)
+            return
         _announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
         with progress("Runs") as update:
@@ -370,6 +386,69 @@ def calibrate(
             typer.echo(found.to_text())
 
 
+@app.command()
+def compare(
+    plant: PlantName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results; new or empty.")],
+    runs: Annotated[int, typer.Option(min=1, help="Judged runs of each scenario.")] = 100,
+    healthy_runs: Annotated[
+        int, typer.Option(min=1, help="Runs without a fault, for tuning and again to judge.")
+    ] = 200,
+    rate: Annotated[float, typer.Option(min=0, help="Share of fault-free runs that may have an alarm.")] = 0.02,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
+    or 1,
+    noise: NoiseName = None,
+    distribution: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="bounded or gaussian noise; may be repeated. [default: both]"),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Set detectors side by side: tuned on the same runs to one false-alarm rate, judged on others.
+
+    Writes DIR/runs.csv, pictures and report.html.
+
+    \b
+    Example:
+      svo compare elevator --runs 50 --healthy-runs 100 --out results
+    """
+    with _one_line_errors():
+        from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
+        from svo.comparison.publish import publish, to_json
+        from svo.plant import load_plant
+        from svo.progress import progress
+        from svo.study.configuration import check_noise
+
+        the_plant = load_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        for name in distribution or ():
+            if name not in DISTRIBUTIONS:
+                raise ValueError(f"distribution is {name!r}; expected one of {', '.join(DISTRIBUTIONS)}")
+        if out.exists() and any(out.iterdir()):
+            raise ValueError(f"{out} is not empty; give another folder")
+        comparison = Comparison(
+            plant,
+            noise,
+            runs=runs,
+            seed=seed,
+            rate=rate,
+            healthy_training=healthy_runs,
+            healthy_runs=healthy_runs,
+            distributions=tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS)),
+        )
+        _announce(PREPARING)
+        with progress("Detectors") as update:
+            compared = run_comparison(comparison, workers=workers, progress=update)
+        summaries = publish(compared, the_plant, out)
+        if as_json:
+            print_json(to_json(summaries))
+            return
+        print_comparison(summaries)
+        typer.echo(f"Report: {out / 'report.html'}")
+
+
 @contextmanager
 def _one_line_errors() -> Iterator[None]:
     """What a user can cause becomes one line on standard error and exit code 1."""
@@ -386,6 +465,23 @@ def _one_line_errors() -> Iterator[None]:
 def _fail(message: str, code: int = 1) -> None:
     typer.echo(f"error: {' '.join(message.split())}", err=True)
     raise typer.Exit(code)
+
+
+def _study_detectors(
+    the_plant: Plant, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
+) -> None:
+    from svo.interval.study import publish, run_detection_study
+    from svo.progress import progress
+
+    with progress("Runs") as update:
+        folder = run_detection_study(configuration, out, workers=workers, resume=resume, progress=update)
+    _announce("Writing summary, pictures and report")
+    found = publish(folder, the_plant)
+    if as_json:
+        print_json({"configuration": configuration.to_dict(), **found.to_dict()})
+        return
+    print_detector_study(found)
+    typer.echo(f"Report: {out / 'report.html'}")
 
 
 def _need_study_extra() -> None:

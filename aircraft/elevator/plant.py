@@ -13,6 +13,7 @@ from aircraft.elevator.gains import ServoGains
 from aircraft.elevator.scenarios import COMMANDS, DURATION, SCENARIOS, TRAVEL, TS, Scenario, SensorNoise
 from aircraft.elevator.servo import Servo
 from polytopes import HPolytope
+from svo.comparison.detector import Detector
 from svo.faults import ActuatorFault
 from svo.interval import (
     FirstOrderScheduler,
@@ -27,7 +28,7 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
-from svo.plant import HEALTHY, Column, Columns, Reference
+from svo.plant import HEALTHY, Column, Columns, Distribution, Reference
 
 Array = NDArray[np.float64]
 
@@ -150,6 +151,22 @@ class Elevator:
         return {f"a = {a:g}": IntervalDetector(self.predictor(first_command), noise, a) for a in POLES}
 
     @property
+    def compared_faults(self) -> tuple[tuple[str, str], ...]:
+        """The paper's three scenarios, and the oscillation that the loop still follows its command under."""
+        return (*TABLE_1, ("oscillation", "liquid"))
+
+    def with_noise(self, distribution: Distribution) -> Elevator:
+        """This plant with its noise clipped at the noise set's bound, or Gaussian."""
+        return replace(self, gaussian=distribution == "gaussian")
+
+    def detectors(self, noise: str) -> list[Detector]:
+        """The detectors to compare, with any noise set; see `aircraft.elevator.detectors`."""
+        from aircraft.elevator.detectors import detectors
+
+        self._bound(noise)
+        return detectors(self.predictor, POLES, QBAR, self.sensor.sigma, self.Ts)
+
+    @property
     def detection_reference(self) -> dict[tuple[str, str], dict[str, float]]:
         """Detection times of the paper's Table 1 [s], by fault, profile and detector."""
         return {key: {f"a = {a:g}": t for a, t in zip(POLES, times, strict=True)} for key, times in TABLE_1.items()}
@@ -185,7 +202,7 @@ class Elevator:
 
 def _beyond_the_stops(fault: ActuatorFault) -> ActuatorFault:
     """A surface that is driven against its stop arrives at a speed which no command within the travel explains."""
-    return fault if fault.travel is None else replace(fault, travel=tuple(1.2 * limit for limit in fault.travel))
+    return fault if fault.travel is None else replace(fault, travel=(1.2 * TRAVEL[0], 1.2 * TRAVEL[1]))
 
 
 def elevator() -> Elevator:
