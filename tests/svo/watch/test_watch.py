@@ -46,6 +46,23 @@ def test_it_says_what_detection_on_the_finished_log_says() -> None:
     assert all(alarm.certificate.verify() for alarm in alarms)
 
 
+def test_a_model_that_recovered_can_be_falsified_again(tmp_path: Path) -> None:
+    """Two outliers, and a bank that forgets a falsification after five consistent samples."""
+    path = tmp_path / "cart.toml"
+    path.write_text(CART.read_text().partition("[faults.sensor]")[0] + "[bank]\nrecovery = 5\n")
+    session = Session(read_description(path), "stated", "log.csv")
+    lines = LOG.read_text().splitlines()
+    for k in (20, 35):
+        cells = lines[k + 1].split(",")
+        lines[k + 1] = ",".join([*cells[:2], "9.0", *cells[3:]])
+    alarms = [alarm for line in lines[:46] for alarm in session.feed(line)]
+    assert [(alarm.observer, alarm.sample) for alarm in alarms] == [("nominal", 20), ("nominal", 35)]
+    status = session.status()
+    assert status is not None
+    assert (status.verdict.state, dict(status.dead)) == ("nominal", {})
+    assert all(alarm.certificate.verify() for alarm in alarms)
+
+
 def test_the_bounds_are_those_of_the_observer_and_hold_the_true_state() -> None:
     lines = LOG.read_text().splitlines()
     session, _ = session_over(lines[:30])
