@@ -62,10 +62,13 @@ class AlarmCheck:
 def write_alarms(path: str | Path, alarms: Iterable[Alarm]) -> None:
     """Write alarms as JSON Lines."""
     with open(path, "w", encoding="utf-8") as file:
-        for alarm in alarms:
-            record = _encode(alarm)
-            record["sha256"] = _digest(record)
-            file.write(json.dumps(record, sort_keys=True) + "\n")
+        file.writelines(_line(alarm) for alarm in alarms)
+
+
+def append_alarm(path: str | Path, alarm: Alarm) -> None:
+    """Add one alarm to a JSON Lines file, which is made if need be."""
+    with open(path, "a", encoding="utf-8") as file:
+        file.write(_line(alarm))
 
 
 def read_alarms(path: str | Path) -> list[Alarm]:
@@ -131,6 +134,12 @@ def _difference(alarm: Alarm, log: Log) -> str | None:
 def _digest(record: Mapping[str, Any]) -> str:
     content = {key: value for key, value in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _line(alarm: Alarm) -> str:
+    record = _encode(alarm)
+    record["sha256"] = _digest(record)
+    return json.dumps(record, sort_keys=True) + "\n"
 
 
 def _encode(alarm: Alarm) -> dict[str, Any]:

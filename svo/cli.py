@@ -10,12 +10,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from svo.cli_output import describe, print_checks, print_detection, print_isolability, print_json, print_study
+from svo.cli_output import (
+    describe,
+    print_checks,
+    print_comparison,
+    print_detection,
+    print_detector_study,
+    print_isolability,
+    print_json,
+    print_study,
+)
 
 if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
     from svo.log import Log
-    from svo.plant import Plant
+    from svo.plant import MonitoredPlant, Plant
+    from svo.study.configuration import StudyConfiguration
 
 app = typer.Typer(
     help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
@@ -27,6 +37,12 @@ app = typer.Typer(
 
 PREPARING = "Preparing compiled code (about a minute the first time, then kept)"
 
+DescribedName = Annotated[
+    str, typer.Argument(metavar="PLANT", help="A registered plant, or a TOML file that describes one (my.toml).")
+]
+LogFile = Annotated[
+    Path, typer.Argument(metavar="LOG", help="CSV, Parquet or MAT file with the plant's columns (`svo plants --json`).")
+]
 PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered plant; `svo plants` lists them.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]
 NoiseName = Annotated[
@@ -98,15 +114,18 @@ def study(
 ) -> None:
     """Measure times to detect and to isolate over many simulated runs.
 
-    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html.
+    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html. A plant with
+    interval detectors (elevator) is studied with these, each learnt anew in every run.
 
     \b
     Example:
       svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
       svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
+      svo study elevator --runs 200 --seed 0 --out results
     """
     with _one_line_errors():
         _need_study_extra()
+        from svo.interval.study import LearnsDetectors
         from svo.plant import load_plant
         from svo.progress import progress
         from svo.study.configuration import StudyConfiguration
@@ -119,6 +138,9 @@ def study(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
         )
         StudyFolder(out).check(configuration, resume)
+        if isinstance(the_plant, LearnsDetectors):
+            _study_detectors(the_plant, configuration, out, workers, resume, as_json)
+            return
         _announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
         with progress("Runs") as update:
@@ -155,7 +177,7 @@ def simulate(
     """
     with _one_line_errors():
         from svo.log_file import write_log
-        from svo.plant import HEALTHY, load_plant
+        from svo.plant import HEALTHY, fault_start, load_plant
         from svo.study.configuration import check_fault, check_noise
 
         the_plant = load_plant(plant)
@@ -172,16 +194,15 @@ def simulate(
             profile = profile or the_plant.faults[fault][0]
         log = the_plant.simulate(fault, profile, noise, seed)
         write_log(out, log, the_plant.columns)
-        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {the_plant.fault_time:g} s"
+        start = fault_start(the_plant, fault, profile)
+        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {start:g} s"
         typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
 
 
 @app.command()
 def detect(
-    plant: PlantName,
-    log: Annotated[
-        Path, typer.Argument(metavar="LOG", help="CSV file with the plant's columns; see `svo plants --json`.")
-    ],
+    plant: DescribedName,
+    log: LogFile,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl and verdict.json.")] = None,
     noise: NoiseName = None,
     architecture: Architecture = None,
@@ -194,30 +215,87 @@ def detect(
     \b
     Example:
       svo detect eclipse log.csv --out findings
+      svo detect my.toml log.mat --out findings
     """
     with _one_line_errors():
+        from svo.description import find_plant, keep_description
         from svo.detect import detect as run_detection
         from svo.detect import write_detection
         from svo.log_file import read_log
-        from svo.plant import in_architecture, load_plant
+        from svo.plant import DetectsThresholds, in_architecture
         from svo.progress import progress
         from svo.study.configuration import check_noise
 
-        the_plant = in_architecture(load_plant(plant), architecture)
+        the_plant = in_architecture(find_plant(plant), architecture)
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
         _announce(PREPARING)
         with progress("Samples") as update:
             found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
+        crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
+        beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
         if out is not None:
-            write_detection(out, found)
+            write_detection(out, found, beside)
+            keep_description(the_plant, out)
         if as_json:
-            print_json(found.to_dict())
+            print_json(found.to_dict() | beside)
             return
         print_detection(found)
+        if crossings is not None:
+            typer.echo(crossings.to_text())
         if out is not None:
             typer.echo(f"Alarms with certificates: {out / 'alarms.jsonl'}")
+
+
+@app.command()
+def watch(
+    plant: DescribedName,
+    log: Annotated[str, typer.Argument(metavar="LOG", help="CSV file that is being written, or - for standard input.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl, written as they are raised.")
+    ] = None,
+    noise: NoiseName = None,
+    until_end: Annotated[
+        bool, typer.Option("--until-end", help="End where the file ends, instead of waiting for more.")
+    ] = False,
+) -> None:
+    """Show live what a plant's isolation bank says about a log that is still growing.
+
+    Which models are alive, bounds of each state by each of them, and each alarm with its certificate. In a terminal a
+    table, elsewhere plain lines. Ctrl-C ends it; standard input ends it too. The exit code is then 0.
+
+    \b
+    Example:
+      svo watch eclipse log.csv --out findings
+      logger | svo watch my.toml -
+    """
+    with _one_line_errors():
+        from functools import partial
+
+        from svo.alarms import append_alarm, write_alarms
+        from svo.cli_output import console
+        from svo.description import find_plant, keep_description
+        from svo.study.configuration import check_noise
+        from svo.watch.lines import lines_of
+        from svo.watch.session import Session
+        from svo.watch.view import view_of
+        from svo.watch.watch import watch as run_watch
+
+        the_plant = find_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        lines = lines_of(log, until_end)
+        session = Session(the_plant, noise, lines.name)
+        keep = None
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            write_alarms(out / "alarms.jsonl", [])
+            keep_description(the_plant, out)
+            keep = partial(append_alarm, out / "alarms.jsonl")
+        _announce(PREPARING)
+        session.warm_up()
+        run_watch(lines, session, view_of(console(), session), keep=keep)
 
 
 @app.command()
@@ -344,8 +422,8 @@ def design_input(
 
 @app.command()
 def calibrate(
-    plant: PlantName,
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="CSV file of a flight without faults.")],
+    plant: DescribedName,
+    log: LogFile,
     noise: NoiseName = None,
     as_json: AsJson = False,
 ) -> None:
@@ -359,12 +437,12 @@ def calibrate(
       svo calibrate eclipse log.csv --noise quiet
     """
     with _one_line_errors():
+        from svo.description import find_plant
         from svo.log_calibration import calibrate_log
         from svo.log_file import read_log
-        from svo.plant import load_plant
         from svo.study.configuration import check_noise
 
-        the_plant = load_plant(plant)
+        the_plant = find_plant(plant)
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
         samples = read_log(log, the_plant.columns, the_plant.Ts)
@@ -374,6 +452,69 @@ def calibrate(
             print_json(found.to_dict())
         else:
             typer.echo(found.to_text())
+
+
+@app.command()
+def compare(
+    plant: PlantName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results; new or empty.")],
+    runs: Annotated[int, typer.Option(min=1, help="Judged runs of each scenario.")] = 100,
+    healthy_runs: Annotated[
+        int, typer.Option(min=1, help="Runs without a fault, for tuning and again to judge.")
+    ] = 200,
+    rate: Annotated[float, typer.Option(min=0, help="Share of fault-free runs that may have an alarm.")] = 0.02,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
+    or 1,
+    noise: NoiseName = None,
+    distribution: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="bounded or gaussian noise; may be repeated. [default: both]"),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Set detectors side by side: tuned on the same runs to one false-alarm rate, judged on others.
+
+    Writes DIR/runs.csv, pictures and report.html.
+
+    \b
+    Example:
+      svo compare elevator --runs 50 --healthy-runs 100 --out results
+    """
+    with _one_line_errors():
+        from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
+        from svo.comparison.publish import publish, to_json
+        from svo.plant import load_plant
+        from svo.progress import progress
+        from svo.study.configuration import check_noise
+
+        the_plant = load_plant(plant)
+        noise = _noise(the_plant, noise)
+        check_noise(the_plant, noise)
+        for name in distribution or ():
+            if name not in DISTRIBUTIONS:
+                raise ValueError(f"distribution is {name!r}; expected one of {', '.join(DISTRIBUTIONS)}")
+        if out.exists() and any(out.iterdir()):
+            raise ValueError(f"{out} is not empty; give another folder")
+        comparison = Comparison(
+            plant,
+            noise,
+            runs=runs,
+            seed=seed,
+            rate=rate,
+            healthy_training=healthy_runs,
+            healthy_runs=healthy_runs,
+            distributions=tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS)),
+        )
+        _announce(PREPARING)
+        with progress("Detectors") as update:
+            compared = run_comparison(comparison, workers=workers, progress=update)
+        summaries = publish(compared, the_plant, out)
+        if as_json:
+            print_json(to_json(summaries))
+            return
+        print_comparison(summaries)
+        typer.echo(f"Report: {out / 'report.html'}")
 
 
 @contextmanager
@@ -394,6 +535,23 @@ def _fail(message: str, code: int = 1) -> None:
     raise typer.Exit(code)
 
 
+def _study_detectors(
+    the_plant: Plant, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
+) -> None:
+    from svo.interval.study import publish, run_detection_study
+    from svo.progress import progress
+
+    with progress("Runs") as update:
+        folder = run_detection_study(configuration, out, workers=workers, resume=resume, progress=update)
+    _announce("Writing summary, pictures and report")
+    found = publish(folder, the_plant)
+    if as_json:
+        print_json({"configuration": configuration.to_dict(), **found.to_dict()})
+        return
+    print_detector_study(found)
+    typer.echo(f"Report: {out / 'report.html'}")
+
+
 def _need_study_extra() -> None:
     from importlib.util import find_spec
 
@@ -411,17 +569,22 @@ def _checks(path: Path, log: Path | None, full: Path | None) -> list[AlarmCheck]
         return verify_alarms(path, None if log is None else _log_of(path, alarms, log))
     if log is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")
-    from svo.plant import load_plant
     from svo.verification import verify_chains
 
     data = _log_of(path, alarms, full)
-    return [] if data is None else verify_chains(path, data, load_plant(str(alarms[0].source["plant"])))
+    return [] if data is None else verify_chains(path, data, _plant_of(path, alarms))
+
+
+def _plant_of(path: Path, alarms: Sequence[Alarm]) -> MonitoredPlant:
+    """The plant whose model alarms are about; a description lies beside them, where `svo detect` put it."""
+    from svo.description import find_plant
+
+    return find_plant(str(alarms[0].source.get("plant")), path.parent)
 
 
 def _log_of(path: Path, alarms: Sequence[Alarm], log: Path) -> Log | None:
     """The log to compare alarms with, read by the columns of their plant; None if there are no alarms."""
     from svo.log_file import read_log
-    from svo.plant import load_plant
 
     if not alarms:
         return None
@@ -429,11 +592,11 @@ def _log_of(path: Path, alarms: Sequence[Alarm], log: Path) -> Log | None:
         raise ValueError(
             f"{path} has alarms of several runs, and a log is that of one; give the alarms of that run alone"
         )
-    plant = load_plant(str(alarms[0].source.get("plant")))
+    plant = _plant_of(path, alarms)
     return read_log(log, plant.columns, plant.Ts)
 
 
-def _noise(plant: Plant, noise: str | None) -> str:
+def _noise(plant: MonitoredPlant, noise: str | None) -> str:
     return plant.noise_sets[0] if noise is None else noise
 
 

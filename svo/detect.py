@@ -15,9 +15,7 @@ from svo.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
-from svo.plant import Plant, architecture_of
-
-Scheduler = Callable[[NDArray[np.float64]], Any]
+from svo.plant import MonitoredPlant, Scheduler, architecture_of, schedule_of
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterat
     the next verdict is asked for.
     """
     for k in range(len(log)):
-        schedule = log.schedule_at(k) if scheduler is None else scheduler(log.y[k])
+        schedule = log.schedule_at(k) if scheduler is None else schedule_of(scheduler, log.y[k], log.u[k])
         if k == 0:
             yield bank.update(log.y[0], u=log.u[0], schedule=schedule)
         else:
@@ -97,7 +95,7 @@ def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterat
 
 
 def detect(
-    plant: Plant,
+    plant: MonitoredPlant,
     log: Log,
     noise: str,
     *,
@@ -108,9 +106,9 @@ def detect(
 
     Parameters
     ----------
-    plant : Plant
+    plant : MonitoredPlant
     log : Log
-        Only time, u and y are used; the plant's own scheduler makes the schedule from y.
+        Only time, u and y are used; the plant's own scheduler makes the schedule of them.
     noise : str
         Noise set whose bounds the observers assume.
     source : mapping, optional
@@ -136,14 +134,18 @@ def alarms_of(record: BankRecord, log: Log, source: Mapping[str, str | int | flo
     return tuple(Alarm(name, k, float(log.time[k]), record.certificates[name], source) for k, name in died)
 
 
-def source_of_bank(plant: Plant) -> dict[str, str]:
+def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:
     """Which bank an alarm comes from, as stored with it: the plant and, if it offers a choice, the architecture."""
     architecture = architecture_of(plant)
     return {"plant": plant.name} | ({} if architecture is None else {"architecture": architecture})
 
 
-def write_detection(folder: Path, detection: Detection) -> None:
-    """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be."""
+def write_detection(folder: Path, detection: Detection, beside: Mapping[str, Any] | None = None) -> None:
+    """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be.
+
+    ``beside`` is added to verdict.json: what detectors without certificates say, by name.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     write_alarms(folder / "alarms.jsonl", detection.alarms)
-    (folder / "verdict.json").write_text(json.dumps(detection.to_dict(), indent=2) + "\n", encoding="utf-8")
+    verdict = {**detection.to_dict(), **(beside or {})}
+    (folder / "verdict.json").write_text(json.dumps(verdict, indent=2) + "\n", encoding="utf-8")

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from svo.plant import Columns
 
 Array = NDArray[np.float64]
 
@@ -62,3 +66,31 @@ class Log:
             return None
         value = self.schedule[k]
         return float(value) if value.ndim == 0 else value
+
+    # -- other forms -----------------------------------------------------------------------------
+
+    def to_dataframe(self, columns: Columns) -> Any:
+        """A `pandas.DataFrame`; see `svo.log_frames.to_dataframe`."""
+        from svo.log_frames import to_dataframe
+
+        return to_dataframe(self, columns)
+
+    @classmethod
+    def from_dataframe(cls, frame: Any, columns: Columns, Ts: float) -> Log:
+        """From a `pandas.DataFrame`; see `svo.log_frames.from_dataframe`."""
+        from svo.log_frames import from_dataframe
+
+        return from_dataframe(frame, columns, Ts)
+
+    def to_xarray(self, columns: Columns) -> Any:
+        """An `xarray.Dataset`; see `svo.log_frames.to_xarray`."""
+        from svo.log_frames import to_xarray
+
+        return to_xarray(self, columns)
+
+    @classmethod
+    def from_xarray(cls, dataset: Any, columns: Columns, Ts: float) -> Log:
+        """From an `xarray.Dataset`; see `svo.log_frames.from_xarray`."""
+        from svo.log_frames import from_xarray
+
+        return from_xarray(dataset, columns, Ts)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,8 +22,10 @@ from polytopes import HPolytope
 from svo.checks import check_disturbance_box, check_noise, finite_array
 from svo.discretisation import discretise
 from svo.log import Log
+from svo.model_file import read_arrays
 from svo.schedule_table import ScheduleTable
 from svo.simulation import simulate
+from svo.state_space import state_space
 from svo.uncertainty import Schedulable, Uncertainty
 
 __all__ = ["Layout", "UncertainModel", "Uncertainty"]
@@ -248,25 +251,38 @@ class UncertainModel:
 
     @classmethod
     def from_statespace(cls, sys: Any, *, Ts: float | None = None, **rest: Any) -> UncertainModel:
-        """From an object with A, B, C, D and dt, such as a ``control.StateSpace``.
+        """From a ``control.StateSpace``, a system of ``scipy.signal``, or an object with A, B, C, D and dt.
 
-        A continuous system (dt = 0) is discretised with ``Ts``; a discrete one keeps its dt, or has the
-        sampling time ``Ts`` if its dt is True. One that leaves open which it is (dt = None) is refused.
+        A continuous system (dt = 0; `scipy.signal.lti`) is discretised with ``Ts``; a discrete one keeps its dt, or
+        has the sampling time ``Ts`` if its dt is True. One that leaves open which it is (dt = None) is refused.
+        A transfer function of scipy is realised first (`to_ss`).
         """
-        D = np.asarray(sys.D, dtype=float)
-        feedthrough = D if D.any() else None
-        dt = getattr(sys, "dt", None)
-        if dt is None:
-            raise ValueError("sys has dt = None; expected 0 (continuous), True or the sampling time: set sys.dt")
-        if dt is not True and dt != 0:
-            if Ts not in (None, dt):
-                raise ValueError(f"Ts is {Ts} but the system is discrete with dt = {dt}; resample it, or leave Ts out")
-            return cls(sys.A, sys.B, sys.C, D=feedthrough, Ts=float(dt), **rest)
+        found = state_space(sys)
+        feedthrough = found.D if found.D.any() else None
+        if found.dt is not True and found.dt != 0:
+            if Ts not in (None, found.dt):
+                raise ValueError(
+                    f"Ts is {Ts} but the system is discrete with dt = {found.dt}; resample it, or leave Ts out"
+                )
+            return cls(found.A, found.B, found.C, D=feedthrough, Ts=float(found.dt), **rest)
         if Ts is None:
-            raise ValueError(f"Ts is missing: the system has dt = {dt!r}, so its sampling time must be given")
-        if dt is True:
-            return cls(sys.A, sys.B, sys.C, D=feedthrough, Ts=Ts, **rest)
-        return cls.from_continuous(sys.A, sys.B, sys.C, Ts=Ts, D=feedthrough, **rest)
+            raise ValueError(f"Ts is missing: the system has dt = {found.dt!r}, so its sampling time must be given")
+        if found.dt is True:
+            return cls(found.A, found.B, found.C, D=feedthrough, Ts=Ts, **rest)
+        return cls.from_continuous(found.A, found.B, found.C, Ts=Ts, D=feedthrough, **rest)
+
+    @classmethod
+    def from_mat(cls, path: str | Path, *, Ts: float, **rest: Any) -> UncertainModel:
+        """From the variables A, B, C, ... of a MAT file; see `svo.model_file.read_arrays`.
+
+        ``rest`` are further arguments, such as ``uncertainties``; the matrices are those of discrete time.
+        """
+        arrays = read_arrays(path)
+        for name in arrays.keys() & rest.keys():
+            raise ValueError(f"{name} is given and {path} has it too; leave it out")
+        for name in {"A", "C"} - {*arrays, *rest}:
+            raise ValueError(f"{path} has no variable {name!r}; expected a matrix, or give it as an argument")
+        return cls(**{"B": None} | arrays | rest, Ts=Ts)
 
     # -- simulation ------------------------------------------------------------------------------
 

@@ -7,10 +7,10 @@ points of its distribution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,29 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
+    from svo.interval.on_log import ThresholdDetection
+
 HEALTHY = "none"
+Distribution = Literal["bounded", "gaussian"]
+
+
+@runtime_checkable
+class InputScheduler(Protocol):
+    """A causal scheduling filter that needs the input of each sample beside its measurement."""
+
+    def with_input(self, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
+        """The schedule of a sample from its y (ny,) and u (nu,); called with each sample in turn."""
+        ...
+
+
+Scheduler = Callable[[NDArray[np.float64]], Any] | InputScheduler
+
+
+def schedule_of(scheduler: Scheduler, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
+    """The schedule of the next sample, by a filter of either kind."""
+    return scheduler.with_input(y, u) if isinstance(scheduler, InputScheduler) else scheduler(y)
 
 
 @dataclass(frozen=True)
@@ -48,9 +70,48 @@ class Reference:
     isolate: str
 
 
+class MonitoredPlant(Protocol):
+    """What detection on recorded data needs to know of a plant: a model and the columns, no simulator.
+
+    Attributes
+    ----------
+    name, title : str
+        The key in the registry (or the name of the file that describes it), and one line for people.
+    Ts : float
+        Sampling time [s].
+    noise_sets : tuple of str
+        Names of the noise and disturbance bounds; the first is the default.
+    columns : Columns
+        Names and units of the channels of a log file.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def Ts(self) -> float: ...
+
+    @property
+    def noise_sets(self) -> tuple[str, ...]: ...
+
+    @property
+    def columns(self) -> Columns: ...
+
+    def bank(self, noise: str) -> Bank:
+        """A fresh isolation bank."""
+        ...
+
+    def scheduler(self) -> Scheduler:
+        """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
+        ...
+
+
 @runtime_checkable
 class Plant(Protocol):
-    """What a study needs to know of a plant.
+    """What a study needs to know of a plant; every one is a `MonitoredPlant` too.
 
     Attributes
     ----------
@@ -94,7 +155,7 @@ class Plant(Protocol):
         """A fresh isolation bank; its fault observers are named as in `faults`."""
         ...
 
-    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+    def scheduler(self) -> Scheduler:
         """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
         ...
 
@@ -160,12 +221,12 @@ class OffersArchitectures(Protocol):
         ...
 
 
-def architecture_of(plant: Plant) -> str | None:
+def architecture_of(plant: MonitoredPlant) -> str | None:
     """The architecture of a plant's bank; None if the plant has one kind of bank only."""
     return plant.architecture if isinstance(plant, OffersArchitectures) else None
 
 
-def in_architecture(plant: Plant, architecture: str | None) -> Plant:
+def in_architecture(plant: Any, architecture: str | None) -> Any:
     """The plant with the bank of an architecture; None = with its own.
 
     Raises
@@ -175,13 +236,61 @@ def in_architecture(plant: Plant, architecture: str | None) -> Plant:
     """
     if architecture is None:
         return plant
+    name = plant.name
     if not isinstance(plant, OffersArchitectures):
-        raise ValueError(f"plant {plant.name!r} has one bank only (no with_architecture); leave the architecture out")
+        raise ValueError(f"plant {name!r} has one bank only (no with_architecture); leave the architecture out")
     if architecture not in plant.architectures:
         raise ValueError(
-            f"plant {plant.name!r} has no architecture {architecture!r}; it has {', '.join(plant.architectures)}"
+            f"plant {name!r} has no architecture {architecture!r}; it has {', '.join(plant.architectures)}"
         )
     return plant.with_architecture(architecture)
+
+
+@runtime_checkable
+class DetectsThresholds(Protocol):
+    """What a `MonitoredPlant` offers besides if an interval detector runs beside its bank."""
+
+    def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
+        """What that detector says about a log; None if there is none after all."""
+        ...
+
+
+@runtime_checkable
+class TimesFaults(Protocol):
+    """What a `Plant` offers besides if its faults do not all begin at `fault_time`."""
+
+    def fault_start(self, fault: str, profile: str) -> float:
+        """Time of the first faulty sample of a fault and profile [s]."""
+        ...
+
+
+def fault_start(plant: Plant, fault: str, profile: str) -> float:
+    """Time of the first faulty sample of a fault and profile [s]; the plant's `fault_time` without a fault."""
+    if fault != HEALTHY and isinstance(plant, TimesFaults):
+        return plant.fault_start(fault, profile)
+    return plant.fault_time
+
+
+@runtime_checkable
+class ComparesDetectors(Protocol):
+    """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.
+
+    Attributes
+    ----------
+    compared_faults : tuple of (fault, profile)
+        The scenarios of the comparison.
+    """
+
+    compared_faults: tuple[tuple[str, str], ...]
+
+    def with_noise(self, distribution: Distribution) -> Plant:
+        """This plant with its noise drawn "bounded" (within the bounds of the noise set), or "gaussian" (the same
+        rms, unbounded); models and bounds stay as they are."""
+        ...
+
+    def detectors(self, noise: str) -> Sequence[Detector]:
+        """The detectors to compare with one noise set; their names differ."""
+        ...
 
 
 def registered_plants() -> dict[str, Callable[[], Plant]]:

@@ -16,10 +16,10 @@ from svo.isolation.logic import GLOBAL
 from svo.log import Log
 from svo.observers.chain import ProvingObserver
 from svo.observers.window import WindowObserver
-from svo.plant import Plant, in_architecture
+from svo.plant import MonitoredPlant, in_architecture, schedule_of
 
 
-def verify_chains(path: str | Path, log: Log, plant: Plant) -> list[AlarmCheck]:
+def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:
     """Check every stored alarm and, if it holds, run its bank over the log again and prove every bound of its observer.
 
     The observers are those of the plant's bank for the noise set and architecture that the alarm names, so this also
@@ -32,18 +32,18 @@ def verify_chains(path: str | Path, log: Log, plant: Plant) -> list[AlarmCheck]:
         JSON Lines, as `svo.alarms.write_alarms` writes them; all alarms of one run.
     log : Log
         Only time, u and y are used; the plant's own scheduler makes the schedule from y.
-    plant : Plant
+    plant : MonitoredPlant
     """
     checks = verify_alarms(path, log)
     if not all(check.ok for check in checks):
         return checks
     scheduler = plant.scheduler()
-    values = [scheduler(y) for y in log.y]
+    values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
     known = replace(log, schedule=None if values[0] is None else np.array(values, dtype=float))
     return [_with_chain(check, alarm, known, plant) for check, alarm in zip(checks, read_alarms(path), strict=True)]
 
 
-def _with_chain(check: AlarmCheck, alarm: Alarm, log: Log, plant: Plant) -> AlarmCheck:
+def _with_chain(check: AlarmCheck, alarm: Alarm, log: Log, plant: MonitoredPlant) -> AlarmCheck:
     begun = perf_counter()
     architecture = alarm.source.get("architecture")
     chosen = in_architecture(plant, None if architecture is None else str(architecture))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,10 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
-from svo.plant import Column, Columns, Reference, StatedFault
+from svo.plant import Column, Columns, Distribution, Reference, StatedFault
+
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
 
 Array = NDArray[np.float64]
 
@@ -60,6 +63,9 @@ COLUMNS = Columns(
 # Any state of a flight between 25 and 55 m/s; the first measurement cuts it down to the sensors' bounds.
 INITIAL_LOWER = (15.0, -15.0, -0.8, -2.0)
 INITIAL_UPPER = (65.0, 25.0, 0.8, 2.0)
+
+
+COMPARED_FAULTS = tuple((fault, profile) for fault in FAULTS for profile in ("step", "soft"))
 
 
 def _description(fault: str, size: float) -> str:
@@ -103,6 +109,7 @@ class Eclipse:
     noise_sets: tuple[str, ...] = tuple(NOISE_SETS)
     columns: Columns = COLUMNS
     input_limits: tuple[Array, Array] = field(default_factory=lambda: (INPUT_LOWER, INPUT_UPPER))
+    compared_faults: tuple[tuple[str, str], ...] = COMPARED_FAULTS
     reference: Mapping[tuple[str, str], Reference] = field(default_factory=lambda: REFERENCE)
     reference_title: str = (
         "Rosa and Silvestre, Control Engineering Practice 21 (2013), section 6: "
@@ -165,6 +172,17 @@ class Eclipse:
     def with_architecture(self, architecture: Literal["I", "II"]) -> Eclipse:
         """The same plant with the other bank."""
         return replace(self, architecture=architecture)
+
+    def with_noise(self, distribution: Distribution) -> Eclipse:
+        """This aircraft with bounded or Gaussian noise and gusts of the same rms; models and bounds are unchanged."""
+        return replace(self, scenarios=replace(self.scenarios, distribution=distribution))
+
+    def detectors(self, noise: str) -> list[Detector]:
+        """What ``svo compare eclipse`` sets side by side; see `aircraft.eclipse.detectors`."""
+        from aircraft.eclipse.detectors import detectors
+
+        stated = {name: fault.model for name, fault in self.stated_faults(noise).items()}
+        return detectors(self.models(noise), stated, HPolytope.box(INITIAL_LOWER, INITIAL_UPPER))
 
     def scheduler(self) -> AirspeedFilter:
         """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""

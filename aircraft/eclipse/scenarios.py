@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aircraft.disturbances import Distribution
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, design_autopilot
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.models import SPEED_MOMENT_INCREASE, ScheduledModel
@@ -70,10 +71,13 @@ class Scenarios:
         Gives the surrogate, the derivatives, and the direction of the dynamics fault.
     size : float
         Of every fault, as a fraction of the paper's, in (0, 1].
+    distribution : {"bounded", "gaussian"}
+        Of all noises and gusts: within the bounds of the noise set, or Gaussian of the same rms, which leaves them.
     """
 
     model: ScheduledModel = field(default_factory=lambda: ScheduledModel(TS))
     size: float = 1.0
+    distribution: Distribution = "bounded"
 
     def __post_init__(self) -> None:
         if not 0.0 < self.size <= 1.0:
@@ -121,7 +125,8 @@ class Scenarios:
         samples = round(self.duration(fault, profile) / self.model.Ts)
         time = np.arange(samples, dtype=np.float64) * float(self.model.Ts)
         active = None if fault == HEALTHY else self.fault(fault, profile)
-        sensor_noise, gusts = NOISE_SETS[_known(noise)].draw(samples, self.model.Ts, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        sensor_noise, gusts = NOISE_SETS[_known(noise)].draw(samples, self.model.Ts, rng, self.distribution)
         corruption = corrupt(active, time, self.model.moment_reference)
         start = level_trim(self.model.surrogate, DESIGN_AIRSPEED).x
         controller = _autopilot(noise, self.model.Ts, self.model.surrogate)

@@ -30,7 +30,8 @@ class ArchitectureI(Bank):
     nominal : Observer
     faults : mapping of str to Observer
         One observer a fault, by the fault's name. All observers see the same inputs and outputs; no
-        observer may stand twice in the bank.
+        observer may stand twice in the bank. Without any the bank detects only, and a falsified nominal
+        model leaves the data unexplained.
     debounce : int
         Certified falsifications, each after a new initialisation, that declare a model falsified.
     recovery : int, optional
@@ -158,6 +159,8 @@ class ArchitectureII(Bank):
     ) -> None:
         check_counts(debounce, recovery, timeout)
         observers = by_name(nominal, faults, reserved=(NOMINAL, GLOBAL))
+        if not faults:
+            raise ValueError("faults is empty; expected at least one fault observer (ArchitectureI needs none)")
         names = tuple(observers)
         _check_class_one(class_one, faults)
         self._constant: HPolytope | None = None

@@ -298,8 +298,6 @@ def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[s
     taken = " or ".join(repr(name) for name in reserved)
     if not isinstance(faults, Mapping):
         raise TypeError(f"faults is a {type(faults).__name__}; expected a mapping of fault names to observers")
-    if not faults:
-        raise ValueError("faults is empty; expected at least one fault observer (to detect only, run one observer)")
     for name in faults:
         if not isinstance(name, str) or not name.strip() or name in reserved:
             raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")

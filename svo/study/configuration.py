@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from svo.plant import HEALTHY, Plant, architecture_of, in_architecture
+from svo.plant import HEALTHY, MonitoredPlant, Plant, architecture_of, in_architecture
 
 _PACKAGES = ("svo-fdi", "numpy", "scipy", "numba", "highspy", "python-flint", "pyarrow")
 
@@ -149,7 +149,7 @@ def conditions(plant: Plant) -> list[tuple[str, str]]:
     return [(HEALTHY, HEALTHY), *((fault, profile) for fault, profiles in plant.faults.items() for profile in profiles)]
 
 
-def check_noise(plant: Plant, noise: str) -> None:
+def check_noise(plant: MonitoredPlant, noise: str) -> None:
     """Raise a ValueError if the plant has no noise set of that name."""
     if noise not in plant.noise_sets:
         raise ValueError(f"plant {plant.name!r} has no noise set {noise!r}; it has {', '.join(plant.noise_sets)}")

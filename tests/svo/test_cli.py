@@ -51,7 +51,7 @@ def test_plants_are_listed_with_what_they_have(registered_tank: str) -> None:
     assert every["eclipse"]["Ts"] == 0.01
 
 
-@pytest.mark.parametrize("command", ["plants", "study", "simulate", "detect", "verify"])
+@pytest.mark.parametrize("command", ["plants", "study", "simulate", "detect", "watch", "verify"])
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = svo(command, "--help")
     assert result.exit_code == 0
@@ -154,7 +154,9 @@ def test_what_does_not_exist_is_one_line(log: Path, tmp_path: Path) -> None:
     assert "has no noise set 'loud'; it has calm, rough" in one_line(svo("detect", "tank", log, "--noise", "loud"))
     assert "missing.csv: No such file" in one_line(svo("detect", "tank", tmp_path / "missing.csv"))
     assert "missing.jsonl: No such file" in one_line(svo("verify", tmp_path / "missing.jsonl"))
-    assert "Is a directory" in one_line(svo("detect", "tank", tmp_path))
+    (tmp_path / "folder.csv").mkdir()
+    assert "Is a directory" in one_line(svo("detect", "tank", tmp_path / "folder.csv"))
+    assert "has the suffix '.xls'; expected one of .csv, .parquet, .mat" in one_line(svo("detect", "tank", "log.xls"))
     simulate = ("simulate", "tank", "--out", tmp_path / "x.csv")
     assert "has no fault 'rust'" in one_line(svo(*simulate, "--fault", "rust"))
     assert "has no profile 'soft'; it has step" in one_line(svo(*simulate, "--fault", "gauge", "--profile", "soft"))

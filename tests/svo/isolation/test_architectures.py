@@ -191,13 +191,23 @@ def test_boxes_are_not_computed_where_nothing_starts_again() -> None:
     ArchitectureI(TouchyObserver(1.0), {"a": TouchyObserver(2.0)}).run(log_of(0.0, 1.0, 0.0))
 
 
+def test_without_faults_a_bank_detects_only() -> None:
+    record = ArchitectureI(FakeObserver(1.0), {}).run(log_of(0.0, 1.0, 0.0))
+    assert record.states == ("nominal", "unexplained", "unexplained")
+    assert record.detected_at == 1
+    assert record.died_at == {"nominal": 1}
+
+
+def test_without_faults_a_bank_recovers() -> None:
+    record = ArchitectureI(FakeObserver(1.0), {}, recovery=2).run(log_of(0.0, 1.0, 0.0, 0.0, 0.0))
+    assert record.states == ("nominal", "unexplained", "unexplained", "nominal", "nominal")
+
+
 # -- refusals ------------------------------------------------------------------------------------
 
 
 def test_names_and_observers_are_checked() -> None:
     one, two = FakeObserver(1.0), FakeObserver(2.0)
-    with pytest.raises(ValueError, match="faults is empty"):
-        ArchitectureI(one, {})
     with pytest.raises(TypeError, match="faults is a list"):
         ArchitectureI(one, [two])  # type: ignore[arg-type]
     for name in ("nominal", "", "  ", 3):

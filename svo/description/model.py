@@ -1,0 +1,101 @@
+"""The tables [model] and [initial]: matrices, bounds, uncertainties and the set of first states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polytopes import HPolytope
+from svo.description.table import Table
+from svo.model import UncertainModel
+from svo.model_file import read_arrays
+from svo.uncertainty import Uncertainty
+
+ARRAYS = ("A", "B", "a", "E", "C", "D", "c", "F")
+BOUNDS = ("n", "w")
+_MODEL = (*ARRAYS, *BOUNDS, "continuous", "remainder", "file", "uncertainties")
+_UNCERTAINTY = (*ARRAYS, "bounds", "name")
+
+
+def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
+    """The model of [model], with the sampling time of the top."""
+    table = top.table("model", _MODEL)
+    arrays = _arrays_of_file(table) | arrays_of(table)
+    for key in ("A", "C"):
+        if key not in arrays:
+            raise table.error(key, "is missing; expected a matrix such as [[0.9]]")
+    uncertainties = [_uncertainty(entry) for entry in table.tables("uncertainties", _UNCERTAINTY)]
+    rest: dict[str, Any] = {"Ts": top.number("Ts"), "uncertainties": uncertainties}
+    if "remainder" in table:
+        rest["remainder"] = table.array("remainder")
+    continuous = table.truth("continuous", False)
+    if not continuous and "remainder" in table:
+        raise table.error("remainder", "has no meaning for a discrete model; drop it, or say continuous = true")
+    with table.errors():
+        if continuous:
+            rest |= {"B": arrays.pop("B", None)}
+            return UncertainModel.from_continuous(**arrays, **rest, names=names)
+        return UncertainModel(**{"B": None} | arrays, **rest, names=names)
+
+
+def arrays_of(table: Table) -> dict[str, Any]:
+    """The model arrays and bounds that a table gives, by their names."""
+    arrays: dict[str, Any] = {name: table.array(name) for name in (*ARRAYS, "n") if name in table}
+    if "w" in table:
+        arrays["w"] = _disturbance_bounds(table)
+    return arrays
+
+
+def box_of(table: Table, n_states: int) -> HPolytope:
+    """A set of states: lower and upper bounds, or rows A x <= b."""
+    table.check_keys(("lower", "upper", "A", "b"))
+    with table.errors():
+        if "A" in table or "b" in table:
+            if "lower" in table or "upper" in table:
+                raise ValueError("has rows (A, b) and bounds (lower, upper); expected one of both")
+            found = HPolytope(table.array("A"), table.array("b"))
+        else:
+            found = HPolytope.box(table.array("lower"), table.array("upper"))
+        if found.dim != n_states:
+            raise ValueError(f"has {found.dim} dimensions; expected {n_states}, the number of states")
+        if found.emptiness().status != "nonempty" or not found.is_bounded():
+            raise ValueError("is empty or unbounded; expected a bounded set with a point")
+    return found
+
+
+def _disturbance_bounds(table: Table) -> Any:
+    if not isinstance(table.content["w"], dict):
+        return table.array("w")
+    ends = table.table("w", ("lower", "upper"))
+    return ends.array("lower"), ends.array("upper")
+
+
+def _arrays_of_file(table: Table) -> dict[str, Any]:
+    """Arrays of the MAT file that a table names, beside the TOML file."""
+    if "file" not in table:
+        return {}
+    arrays = read_arrays(table.path.parent / model_file(table))
+    twice = [name for name in arrays if name in table]
+    if twice:
+        raise table.error(twice[0], f"is given here and in {table.text('file')}; drop one of both")
+    return arrays
+
+
+def model_file(table: Table) -> Path:
+    """The MAT file that [model] names, relative to the TOML file."""
+    file = Path(table.text("file"))
+    if file.is_absolute() or ".." in file.parts:
+        raise table.error("file", f"is {str(file)!r}; expected a file beside the TOML file, or in a folder beside it")
+    return file
+
+
+def _uncertainty(table: Table) -> Uncertainty:
+    arrays = {name: table.array(name) for name in ARRAYS if name in table}
+    if not arrays:
+        raise table.error(None, f"has no direction; expected at least one of {', '.join(ARRAYS)}")
+    bounds = table.array("bounds") if "bounds" in table else np.array([-1.0, 1.0])
+    with table.errors():
+        return Uncertainty(**arrays, bounds=tuple(bounds), name=table.text("name", ""))

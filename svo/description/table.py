@@ -1,0 +1,138 @@
+"""Tables of a TOML file, read so that every mistake is one error that names file, table and key."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_KINDS = {str: "text in quotes", bool: "true or false", int: "a whole number", dict: "a table", list: "a list"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table, with its file and its name in it ("" at the top).
+
+    Raises
+    ------
+    ValueError
+        From every method: naming file, table and key, what was found and what was expected.
+    """
+
+    path: Path
+    name: str
+    content: Mapping[str, Any]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.content
+
+    def check_keys(self, known: Sequence[str]) -> None:
+        """Refuse keys that nothing would read, with the known one that was probably meant."""
+        for key in self.content:
+            if key not in known:
+                by_lower_case = {name.lower(): name for name in known}
+                close = get_close_matches(key.lower(), by_lower_case, n=1)
+                meant = f"; did you mean {by_lower_case[close[0]]!r}?" if close else ""
+                raise self.error(key, f"there is no such key{meant} (known: {', '.join(known)})")
+
+    def error(self, key: str | None, message: str) -> ValueError:
+        """An error that says where it is; without a key, of the table itself."""
+        place = [f"{self.path}"]
+        if self.name:
+            place.append(f"[{self.name}]")
+        if key is not None:
+            place.append(f"key {key!r}")
+        return ValueError(f"{', '.join(place)}: {message}")
+
+    @contextmanager
+    def errors(self) -> Iterator[None]:
+        """Give errors of what is made from this table its place."""
+        try:
+            yield
+        except (ValueError, TypeError) as error:
+            raise self.error(None, str(error)) from error
+
+    def text(self, key: str, default: str | None = None, choices: Sequence[str] = ()) -> str:
+        value = str(self._value(key, str, default))
+        if choices and value not in choices:
+            raise self.error(key, f"is {value!r}; expected one of {', '.join(choices)}")
+        return value
+
+    def truth(self, key: str, default: bool) -> bool:
+        return bool(self._value(key, bool, default))
+
+    def count(self, key: str, default: int | None = None) -> int:
+        return int(self._value(key, int, default))
+
+    def number(self, key: str, default: float | None = None) -> float:
+        value = self._value(key, None, default)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(key, f"is {value!r}; expected a number")
+        return float(value)
+
+    def array(self, key: str) -> NDArray[np.float64]:
+        """Numbers in brackets, nested for a matrix."""
+        value = self._value(key, None, None)
+        try:
+            if not isinstance(value, list) or _has_other_than_numbers(value):
+                raise ValueError
+            array = np.array(value, dtype=float)
+        except ValueError:
+            wanted = "[1, 2], or [[1, 2], [3, 4]] for a matrix with rows of one length"
+            raise self.error(key, f"is {value!r}; expected numbers in brackets such as {wanted}") from None
+        return array
+
+    def table(self, key: str, known: Sequence[str] | None = None) -> Table:
+        """A table inside this one; an empty one if it is not there."""
+        value = self._value(key, dict, {})
+        inner = Table(self.path, self._inside(key), value)
+        if known is not None:
+            inner.check_keys(known)
+        return inner
+
+    def tables(self, key: str, known: Sequence[str]) -> list[Table]:
+        """A list of tables inside this one; empty if it is not there."""
+        value = self._value(key, list, [])
+        if not all(isinstance(item, dict) for item in value):
+            raise self.error(key, f"is {value!r}; expected a list of tables such as [{{{known[0]} = ...}}]")
+        inner = [Table(self.path, f"{self._inside(key)}, entry {i}", item) for i, item in enumerate(value, start=1)]
+        for item in inner:
+            item.check_keys(known)
+        return inner
+
+    def _inside(self, key: str) -> str:
+        return f"{self.name}.{key}" if self.name else key
+
+    def _value(self, key: str, kind: type | None, default: Any) -> Any:
+        if key not in self.content:
+            if default is None:
+                raise self.error(key, "is missing")
+            return default
+        value = self.content[key]
+        if kind is not None and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):
+            raise self.error(key, f"is {value!r}; expected {_KINDS[kind]}")
+        return value
+
+
+def read_table(path: Path, known: Sequence[str]) -> Table:
+    """The top of a TOML file."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not TOML: {error}") from error
+    table = Table(path, "", content)
+    table.check_keys(known)
+    return table
+
+
+def _has_other_than_numbers(value: Any) -> bool:
+    if isinstance(value, list):
+        return any(_has_other_than_numbers(item) for item in value)
+    return isinstance(value, bool) or not isinstance(value, int | float)

@@ -1,0 +1,110 @@
+"""Logs as CSV text: a header with column names, then one row a sample; UTF-8, commas.
+
+Floats are written in their shortest form that reads back to the same bits.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import numpy as np
+
+from svo.log import Log
+from svo.log_columns import Array, assemble, may_be_missing, not_finite, not_there, wanted_columns
+
+if TYPE_CHECKING:
+    from svo.plant import Columns
+
+
+def write_csv(path: Path, cells: Mapping[str, Array]) -> None:
+    """Write columns (K,) by name; NaN becomes an empty cell."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(cells)
+        for row in np.column_stack(list(cells.values())).tolist():
+            writer.writerow("" if math.isnan(value) else repr(value) for value in row)
+
+
+def read_csv(path: Path, columns: Columns, Ts: float) -> Log:
+    """Read a log; errors name the line and the column."""
+    with path.open(newline="", encoding="utf-8-sig") as file, csv_errors(str(path)):
+        rows = _rows(file)
+        parser = RowParser(str(path), next(rows, (0, []))[1], columns)
+        lines, values = [], []
+        for line, row in rows:
+            lines.append(line)
+            values.append(parser.parse(line, row))
+    table = np.array(values).reshape(-1, len(parser.names))
+    cells = {name: table[:, i].copy() for i, name in enumerate(parser.names)}
+    return assemble(str(path), cells, columns, Ts, lambda k: f"line {lines[k]}")
+
+
+class RowParser:
+    """Turns the rows under one header into numbers, in the order of ``names``.
+
+    Attributes
+    ----------
+    names : list of str
+        The columns that are read: time, inputs, outputs and, if all are there, states.
+    """
+
+    def __init__(self, source: str, header: Sequence[str], columns: Columns) -> None:
+        if not header:
+            raise ValueError(f"{source} is empty; expected a header line with column names and one row a sample")
+        present = [name.strip() for name in header]
+        self.names = wanted_columns(source, present, columns)
+        self._source, self._width = source, len(present)
+        self._where = [present.index(name) for name in self.names]
+        unknown = may_be_missing(columns)
+        self._may_be_missing = [name in unknown for name in self.names]
+
+    def parse(self, line: int, row: Sequence[str]) -> list[float]:
+        """Numbers of one row.
+
+        Raises
+        ------
+        ValueError
+            Naming the line and the column.
+        """
+        if len(row) != self._width:
+            raise ValueError(f"{self._source}, line {line}: {len(row)} cells; expected {self._width}, as in the header")
+        return [self._number(line, i, row[position]) for i, position in enumerate(self._where)]
+
+    def _number(self, line: int, i: int, cell: str) -> float:
+        text = cell.strip()
+        try:
+            value = float(text) if text else math.nan
+        except ValueError:
+            value = math.inf
+        if math.isinf(value) or "_" in text:
+            raise not_finite(self._place(line, i), cell)
+        if math.isnan(value) and not self._may_be_missing[i]:
+            raise not_there(self._place(line, i))
+        return value
+
+    def _place(self, line: int, i: int) -> str:
+        return f"{self._source}, line {line}, column {self.names[i]!r}"
+
+
+@contextmanager
+def csv_errors(source: str) -> Iterator[None]:
+    """Say of bytes that are no CSV text what they are not."""
+    try:
+        yield
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(
+            f"{source} is not a CSV text file ({error}); expected comma-separated columns in UTF-8"
+        ) from error
+
+
+def _rows(file: TextIO) -> Iterator[tuple[int, list[str]]]:
+    """Line numbers and cells of the rows that are not blank."""
+    reader = csv.reader(file)
+    for row in reader:
+        if row:
+            yield reader.line_num, row

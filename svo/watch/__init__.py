@@ -1,0 +1,1 @@
+"""A live view of a bank on a log that is still being written."""

@@ -1,0 +1,175 @@
+"""The table [interval_detector], and the command line with a described plant."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from svo.cli import app
+from svo.description import DescribedPlant, read_description
+from svo.interval import GainBounds, IntervalDetector, IntervalPredictor, NoiseCharacterization
+from svo.log import Log
+from svo.log_file import write_log
+
+TEXT = """
+Ts = 0.01
+[columns]
+inputs = [{ name = "u", unit = "m" }]
+outputs = [{ name = "y", unit = "m" }]
+[model]
+A = [[0.9]]
+B = [[0.1]]
+C = [[1.0]]
+n = [0.05]
+[initial]
+lower = [-1]
+upper = [1]
+[interval_detector]
+g = [0.9, 0.005]
+h = [1.0, 0.0]
+initial_radius = 0.02
+pole = 0.8
+qbar = 20
+learn_until_s = 3.0
+"""
+
+
+def run_of(samples: int, seed: int, jam_at: int | None = None) -> Log:
+    rng = np.random.default_rng(seed)
+    u = np.sin(0.07 * np.arange(samples))
+    x = np.zeros(samples)
+    for k in range(samples - 1):
+        x[k + 1] = 0.9 * x[k] + 0.1 * u[k]
+    y = x + rng.uniform(-0.03, 0.03, samples)
+    if jam_at is not None:
+        y[jam_at:] = y[jam_at]
+    return Log(time=np.arange(samples) * 0.01, u=u[:, None], y=y[:, None])
+
+
+def described(tmp_path: Path, *changes: tuple[str, str]) -> DescribedPlant:
+    text = TEXT
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "servo.toml"
+    path.write_text(text)
+    return read_description(path)
+
+
+def by_hand(learning: list[Log], judged: Log) -> Any:
+    gains = GainBounds(0.9, 0.005)
+
+    def predictor(log: Log) -> IntervalPredictor:
+        return IntervalPredictor(gains, (float(log.y[0, 0]), 0.02))
+
+    noise = NoiseCharacterization.from_records([predictor(log).predict(log).residual for log in learning], 20, 1.2)
+    return IntervalDetector(predictor(judged), noise, 0.8).run(judged)
+
+
+def test_it_learns_from_the_beginning_of_the_log_and_judges_the_rest(tmp_path: Path) -> None:
+    log = run_of(800, 0, jam_at=600)
+    found = described(tmp_path).detect_thresholds(log)
+    assert found is not None
+    first, rest = (Log(time=log.time[s], u=log.u[s], y=log.y[s]) for s in (slice(0, 300), slice(300, None)))
+    expected = by_hand([first], rest)
+    assert np.array_equal(found.record.exceeded, expected.exceeded)
+    assert found.first_alarm_s is not None
+    assert 6.0 <= found.first_alarm_s < 6.3
+    assert sum(end - begin for begin, end in found.periods_s) < 2.0
+    assert found.to_dict()["samples_beyond"] == int(expected.exceeded.sum())
+
+
+def test_it_learns_from_records_beside_the_file(tmp_path: Path) -> None:
+    plant = described(tmp_path, ("learn_until_s = 3.0", 'records = ["a.csv", "b.parquet"]'))
+    records = [run_of(300, 1), run_of(400, 2)]
+    for name, log in zip(("a.csv", "b.parquet"), records, strict=True):
+        write_log(tmp_path / name, log, plant.columns)
+    log = run_of(500, 3)
+    found = plant.detect_thresholds(log)
+    assert found is not None
+    assert np.array_equal(found.record.exceeded, by_hand(records, log).exceeded)
+    assert found.periods_s == []
+    assert "no threshold crossing in 500 samples from 0 s on" in found.to_text()
+
+
+def test_without_the_table_there_is_none(tmp_path: Path) -> None:
+    (tmp_path / "servo.toml").write_text(TEXT.partition("[interval_detector]")[0])
+    assert read_description(tmp_path / "servo.toml").detect_thresholds(run_of(10, 0)) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (("g = [0.9, 0.005]", "g = [0.9]"), r"key 'g': is \[0.9\]; expected \[centre, radius\]"),
+        (("g = [0.9, 0.005]", "g = [0.9, -1]"), "key 'g': .*radius >= 0"),
+        (("pole = 0.8", ""), "key 'pole': is missing"),
+        (("qbar = 20", "qbr = 20"), "key 'qbr'.*did you mean 'qbar'"),
+        (("learn_until_s = 3.0", ""), "either records or learn_until_s"),
+        (("learn_until_s = 3.0", "learn_until_s = 3.0\nrecords = ['a.csv']"), "either records or learn_until_s"),
+        (("learn_until_s = 3.0", "records = []"), "key 'records'.*expected names of files"),
+        (("qbar = 20", "input = 'v'"), "key 'input': is 'v'; expected one of the columns u"),
+        (("qbar = 20", "slope = -1"), "slope of the gain bounds is -1"),
+    ],
+)
+def test_a_mistake_is_one_error_with_its_place(tmp_path: Path, change: tuple[str, str], expected: str) -> None:
+    with pytest.raises(ValueError, match=rf"servo\.toml, \[interval_detector\].*{expected}"):
+        described(tmp_path, change)
+
+
+def test_a_time_outside_the_log_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"learn_until_s is 3 s, but the log goes from 0 s to 0\.99 s"):
+        described(tmp_path).detect_thresholds(run_of(100, 0))
+
+
+def test_the_command_reports_both_and_keeps_them_apart(tmp_path: Path) -> None:
+    plant = described(tmp_path)
+    write_log(tmp_path / "log.mat", run_of(800, 0, jam_at=600), plant.columns)
+    arguments = [str(tmp_path / "servo.toml"), str(tmp_path / "log.mat")]
+    done = CliRunner().invoke(app, ["detect", *arguments, "--out", str(tmp_path / "found")])
+    assert done.exit_code == 0, done.output
+    assert "nominal: falsified at 6." in done.stdout
+    assert "This rests on the learnt noise; it is no proof." in done.stdout
+    verdict = json.loads((tmp_path / "found" / "verdict.json").read_text())
+    assert 6.0 <= verdict["interval_detector"]["first_alarm_s"] < 6.3
+    assert len((tmp_path / "found" / "alarms.jsonl").read_text().splitlines()) == 1
+    full = CliRunner().invoke(app, ["verify", str(tmp_path / "found" / "alarms.jsonl"), "--full", arguments[1]])
+    assert full.exit_code == 0, full.output
+    as_json = json.loads(CliRunner().invoke(app, ["detect", *arguments, "--json"]).stdout)
+    assert as_json["interval_detector"] == verdict["interval_detector"]
+
+
+def test_another_model_beside_the_alarms_is_noticed(tmp_path: Path) -> None:
+    plant = described(tmp_path)
+    write_log(tmp_path / "log.csv", run_of(800, 0, jam_at=600), plant.columns)
+    CliRunner().invoke(
+        app, ["detect", str(tmp_path / "servo.toml"), str(tmp_path / "log.csv"), "--out", str(tmp_path / "f")]
+    )
+    copy = tmp_path / "f" / "servo.toml"
+    copy.write_text(copy.read_text().replace("n = [0.05]", "n = [0.5]"))
+    full = CliRunner().invoke(
+        app, ["verify", str(tmp_path / "f" / "alarms.jsonl"), "--full", str(tmp_path / "log.csv")]
+    )
+    assert full.exit_code == 1
+    assert "the plant's observer is falsified" in full.stderr
+
+
+def test_calibration_takes_a_described_plant(tmp_path: Path) -> None:
+    plant = described(tmp_path, ("n = [0.05]", "n = [0.02]"))
+    write_log(tmp_path / "log.csv", run_of(200, 5), plant.columns)
+    done = CliRunner().invoke(app, ["calibrate", str(tmp_path / "servo.toml"), str(tmp_path / "log.csv")])
+    assert done.exit_code == 0, done.output
+    assert "noise y: +" in done.stdout
+
+
+def test_a_mistake_in_the_file_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "servo.toml").write_text(TEXT.replace("[initial]", "[intial]"))
+    for command in ("detect", "watch", "calibrate"):
+        done = CliRunner().invoke(app, [command, str(tmp_path / "servo.toml"), "log.csv"])
+        assert done.exit_code == 1
+        assert done.stderr.startswith(f"error: {tmp_path / 'servo.toml'}, key 'intial'")
+        assert done.stderr.count("\n") == 1
