@@ -57,9 +57,9 @@ def plot_delays(ax: Axes, summaries: Sequence[DetectorComparison], scenario: int
         colour = _COLOURS.get(distribution, "0.4")
         artists.append(ax.hlines(at, low, high, color=colour, lw=1.5))
         artists += ax.plot(median, at, "o", ms=4, color=colour, label=f"{distribution} noise")
-    ax.set_xscale("log")
+    ax.set_xlim(left=0)
     ax.set_xlabel("delay [s]")
-    ax.grid(axis="x", which="both", color="0.92")
+    ax.grid(axis="x", color="0.92")
     ax.set_axisbelow(True)
     return artists
 
