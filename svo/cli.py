@@ -23,6 +23,7 @@ from svo.cli_output import (
 
 if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
+    from svo.interval.study import LearnsDetectors
     from svo.log import Log
     from svo.plant import Plant
     from svo.study.configuration import StudyConfiguration
@@ -407,7 +408,7 @@ def _fail(message: str, code: int = 1) -> None:
 
 
 def _study_detectors(
-    the_plant: Plant, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
+    the_plant: LearnsDetectors, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
 ) -> None:
     from svo.interval.study import publish, run_detection_study
     from svo.progress import progress

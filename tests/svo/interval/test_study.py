@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from svo.cli import app
-from svo.interval.study import publish, run_detection_study, summarise
+from svo.interval.study import LearnsDetectors, publish, run_detection_study, summarise
 from svo.interval.study.run import DetectorRow, execute
 from svo.interval.study.runner import read_rows
 from svo.interval.study.summary import summarise_assumption
@@ -22,6 +22,7 @@ from svo.study.configuration import StudyConfiguration
 pytest.importorskip("pyarrow")
 
 PLANT = load_plant("elevator")
+assert isinstance(PLANT, LearnsDetectors)
 CONFIGURATION = StudyConfiguration.for_plant(PLANT, runs=2, seed=3, faults=["none", "jam"])
 
 
@@ -35,9 +36,9 @@ def test_rows_are_those_of_the_detector_itself(folder) -> None:  # type: ignore[
     assert len(rows) == 2 * 3 * 2 * 5  # runs, conditions, numbers of records, poles
     row = next(r for r in rows if (r.profile, r.records, r.detector) == ("moving", 1, "a = 0.9"))
     log = PLANT.simulate("jam", "moving", row.noise, row.seed)
-    learnt = PLANT.learning_log(row.noise, np.random.SeedSequence(row.seed).spawn(1)[0])  # type: ignore[attr-defined]
-    noise = PLANT.characterise([learnt])  # type: ignore[attr-defined]
-    record = PLANT.interval_detectors(noise, float(log.u[0, 0]))["a = 0.9"].run(log)  # type: ignore[attr-defined]
+    learnt = PLANT.learning_log(row.noise, np.random.SeedSequence(row.seed).spawn(1)[0])
+    noise = PLANT.characterise([learnt])
+    record = PLANT.interval_detectors(noise, float(log.u[0, 0]))["a = 0.9"].run(log)
     alarm = record.first_alarm_from(14.5)
     assert alarm is not None
     assert row.detection_delay_s == pytest.approx(alarm - 14.5 + 0.01)
@@ -98,7 +99,7 @@ def test_summaries_of_rows_made_by_hand() -> None:
 
 def test_the_table_says_infinity_where_a_quantile_was_never_reached() -> None:
     rows = [r for r in made_rows() if r.detector == "a = 0.6"]
-    table = detection_table(PLANT, summarise(PLANT, rows))  # type: ignore[arg-type]
+    table = detection_table(PLANT, summarise(PLANT, rows))
     assert table.rows[0][:2] == ("DV3: jam near steady state", "66")
     assert table.rows[0][2] == "∞\n∞–∞\npaper 68.46"
     assert table.rows[1][2] == "1/3"
@@ -106,7 +107,7 @@ def test_the_table_says_infinity_where_a_quantile_was_never_reached() -> None:
 
 def test_a_job_gives_the_same_rows_twice() -> None:
     job = CONFIGURATION.jobs(PLANT)[0]
-    assert execute(PLANT, job) == execute(PLANT, job)  # type: ignore[arg-type]
+    assert execute(PLANT, job) == execute(PLANT, job)
 
 
 def test_a_plant_without_interval_detectors_is_refused(tmp_path: Path) -> None:
