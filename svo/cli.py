@@ -13,7 +13,6 @@ import typer
 from svo.cli_output import (
     describe,
     print_checks,
-    print_comparison,
     print_detection,
     print_detector_study,
     print_isolability,
@@ -324,69 +323,6 @@ def calibrate(
             print_json(found.to_dict())
         else:
             typer.echo(found.to_text())
-
-
-@app.command()
-def compare(
-    plant: PlantName,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results; new or empty.")],
-    runs: Annotated[int, typer.Option(min=1, help="Judged runs of each scenario.")] = 100,
-    healthy_runs: Annotated[
-        int, typer.Option(min=1, help="Runs without a fault, for tuning and again to judge.")
-    ] = 200,
-    rate: Annotated[float, typer.Option(min=0, help="Share of fault-free runs that may have an alarm.")] = 0.02,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
-    or 1,
-    noise: NoiseName = None,
-    distribution: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="bounded or gaussian noise; may be repeated. [default: both]"),
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Set detectors side by side: tuned on the same runs to one false-alarm rate, judged on others.
-
-    Writes DIR/runs.csv, pictures and report.html.
-
-    \b
-    Example:
-      svo compare elevator --runs 50 --healthy-runs 100 --out results
-    """
-    with _one_line_errors():
-        from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
-        from svo.comparison.publish import publish, to_json
-        from svo.plant import load_plant
-        from svo.progress import progress
-        from svo.study.configuration import check_noise
-
-        the_plant = load_plant(plant)
-        noise = _noise(the_plant, noise)
-        check_noise(the_plant, noise)
-        for name in distribution or ():
-            if name not in DISTRIBUTIONS:
-                raise ValueError(f"distribution is {name!r}; expected one of {', '.join(DISTRIBUTIONS)}")
-        if out.exists() and any(out.iterdir()):
-            raise ValueError(f"{out} is not empty; give another folder")
-        comparison = Comparison(
-            plant,
-            noise,
-            runs=runs,
-            seed=seed,
-            rate=rate,
-            healthy_training=healthy_runs,
-            healthy_runs=healthy_runs,
-            distributions=tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS)),
-        )
-        _announce(PREPARING)
-        with progress("Detectors") as update:
-            compared = run_comparison(comparison, workers=workers, progress=update)
-        summaries = publish(compared, the_plant, out)
-        if as_json:
-            print_json(to_json(summaries))
-            return
-        print_comparison(summaries)
-        typer.echo(f"Report: {out / 'report.html'}")
 
 
 @contextmanager
