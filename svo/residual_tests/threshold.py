@@ -118,8 +118,8 @@ def propagated_bounds(
     """Least and largest residual that bounded disturbances can make of a linear residual generator at rest.
 
     z(k+1) = A z(k) + B w(k), r(k) = C z(k) + D w(k), z(0) = 0, lower <= w(k) <= upper. The bounds are attained:
-    r(k) = sum_j H_j w(k-j), and each w(k-j) can be at the end that the sign of H_j asks for. They are widened by 1e-12 of
-    sum_j |H_j| |w|, for the rounding of the residual.
+    r(k) = sum_j H_j w(k-j), and each w(k-j) can be at the end that the sign of H_j asks for. They are
+    widened by 1e-12 of sum_j |H_j| |w|, for the rounding of the residual.
 
     Parameters
     ----------
