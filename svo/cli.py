@@ -13,7 +13,6 @@ import typer
 from svo.cli_output import (
     describe,
     print_checks,
-    print_comparison,
     print_detection,
     print_detector_study,
     print_isolability,
@@ -23,6 +22,7 @@ from svo.cli_output import (
 
 if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
+    from svo.interval.study import LearnsDetectors
     from svo.log import Log
     from svo.plant import MonitoredPlant, Plant
     from svo.study.configuration import StudyConfiguration
@@ -457,33 +457,39 @@ def calibrate(
 @app.command()
 def compare(
     plant: PlantName,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results; new or empty.")],
-    runs: Annotated[int, typer.Option(min=1, help="Judged runs of each scenario.")] = 100,
-    healthy_runs: Annotated[
-        int, typer.Option(min=1, help="Runs without a fault, for tuning and again to judge.")
-    ] = 200,
-    rate: Annotated[float, typer.Option(min=0, help="Share of fault-free runs that may have an alarm.")] = 0.02,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison.")] = 0,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for comparison.csv, runs.csv and comparison.png.")],
+    runs: Annotated[int, typer.Option(min=1, help="Judged runs of each fault, profile and noise.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison; the same seed gives the same runs.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
     or 1,
     noise: NoiseName = None,
+    rate: Annotated[
+        float, typer.Option(min=0.0, max=0.5, help="Share of fault-free runs that may raise an alarm.")
+    ] = 0.02,
+    healthy_runs: Annotated[
+        int | None, typer.Option(min=1, help="Fault-free runs to tune on, and again to judge. [default: 100 and 200]")
+    ] = None,
     distribution: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="bounded or gaussian noise; may be repeated. [default: both]"),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Set detectors side by side: tuned on the same runs to one false-alarm rate, judged on others.
+    """Set detectors side by side: the same runs, the same optimiser, the same false-alarm rate, other seeds to judge.
 
-    Writes DIR/runs.csv, pictures and report.html.
+    Every detector is tuned on training runs, under bounded and under Gaussian noise, and judged on runs of other
+    seeds. Prints the median delays; the table has the rest.
 
     \b
     Example:
-      svo compare elevator --runs 50 --healthy-runs 100 --out results
+      svo compare eclipse --runs 100 --seed 0 --workers 2 --out comparison
+      svo compare elevator --noise quiet --runs 20 --healthy-runs 50 --out comparison
     """
     with _one_line_errors():
+        from dataclasses import replace
+
         from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
-        from svo.comparison.publish import publish, to_json
+        from svo.comparison.publish import publish_comparison, to_text
         from svo.plant import load_plant
         from svo.progress import progress
         from svo.study.configuration import check_noise
@@ -494,27 +500,19 @@ def compare(
         for name in distribution or ():
             if name not in DISTRIBUTIONS:
                 raise ValueError(f"distribution is {name!r}; expected one of {', '.join(DISTRIBUTIONS)}")
-        if out.exists() and any(out.iterdir()):
-            raise ValueError(f"{out} is not empty; give another folder")
-        comparison = Comparison(
-            plant,
-            noise,
-            runs=runs,
-            seed=seed,
-            rate=rate,
-            healthy_training=healthy_runs,
-            healthy_runs=healthy_runs,
-            distributions=tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS)),
-        )
+        chosen = tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS))
+        comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
+        if healthy_runs is not None:
+            comparison = replace(comparison, healthy_training=healthy_runs, healthy_runs=healthy_runs)
         _announce(PREPARING)
         with progress("Detectors") as update:
-            compared = run_comparison(comparison, workers=workers, progress=update)
-        summaries = publish(compared, the_plant, out)
+            compared = run_comparison(comparison, workers, update)
+        rows = publish_comparison(out, compared, the_plant)
         if as_json:
-            print_json(to_json(summaries))
-            return
-        print_comparison(summaries)
-        typer.echo(f"Report: {out / 'report.html'}")
+            print_json([row.to_dict() for row in rows])
+        else:
+            typer.echo(to_text(rows))
+            typer.echo(f"Table: {out / 'comparison.csv'}; picture: {out / 'comparison.png'}")
 
 
 @contextmanager
@@ -536,7 +534,7 @@ def _fail(message: str, code: int = 1) -> None:
 
 
 def _study_detectors(
-    the_plant: Plant, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
+    the_plant: LearnsDetectors, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
 ) -> None:
     from svo.interval.study import publish, run_detection_study
     from svo.progress import progress

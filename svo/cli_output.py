@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from svo.alarms import AlarmCheck
-    from svo.comparison.summary import DetectorComparison
     from svo.detect import Detection
     from svo.interval.study.publish import DetectionStudy
     from svo.isolability import Isolability
@@ -82,17 +81,6 @@ def print_detector_study(found: DetectionStudy) -> None:
         screen.print(to_rich(table))
     for line in found.findings:
         typer.echo(f"{line[0].upper()}{line[1:]}.")
-
-
-def print_comparison(summaries: Sequence[DetectorComparison]) -> None:
-    """The table of a comparison, one a distribution of the noise."""
-    from svo.comparison.publish import by_distribution
-    from svo.comparison.tables import comparison_table
-    from svo.study.tables import to_rich
-
-    screen = console()
-    for group in by_distribution(summaries):
-        screen.print(to_rich(comparison_table(group)))
 
 
 def print_detection(found: Detection) -> None:

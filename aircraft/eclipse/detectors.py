@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from polytopes import HPolytope
+from svo.baselines import GaussianModel
 from svo.comparison.detector import Detector
+from svo.comparison.residual_detectors import residual_test_detectors
+from svo.comparison.standard import standard_detectors
 from svo.comparison.window_bank import WindowBank
 from svo.model import UncertainModel
 
@@ -27,7 +30,11 @@ def detectors(
     initial : HPolytope
         Set of the state at the first sample.
     """
+    nominal = GaussianModel(models["nominal"], initial)
+    faulty = {name: GaussianModel(model, initial) for name, model in stated.items()}
     return [
         WindowBank(models, initial, STATED_HORIZON, stated=True),
         *(WindowBank(models, initial, horizon) for horizon in HORIZONS),
+        *standard_detectors(nominal, faulty),
+        *residual_test_detectors(nominal),
     ]

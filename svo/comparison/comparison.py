@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from svo.comparison.detector import Detector
+from svo.comparison.detector import Detector, Kind
 from svo.comparison.run import ComparedRun, Condition, compare_run
 from svo.comparison.tuning import FaultyRun, Tuned, tune
 from svo.log import Log
@@ -50,10 +50,10 @@ class Comparison:
     runs: int = 100
     seed: int = 0
     rate: float = 0.02
-    healthy_training: int = 200
+    healthy_training: int = 100
     faulty_training: int = 10
     healthy_runs: int = 200
-    evaluations: int = 25
+    evaluations: int = 15
     distributions: tuple[Distribution, ...] = DISTRIBUTIONS
 
     def __post_init__(self) -> None:
@@ -74,6 +74,7 @@ class Compared:
     """The outcome: one tuned setting for each distribution and detector, and one row for each judged run."""
 
     comparison: Comparison
+    kinds: Mapping[str, Kind]
     tuned: dict[tuple[str, str], Tuned] = field(default_factory=dict)
     rows: list[ComparedRun] = field(default_factory=list)
 
@@ -90,7 +91,8 @@ def run_comparison(comparison: Comparison, workers: int = 1, progress: Progress 
     """
     if workers < 1:
         raise ValueError(f"workers is {workers}; expected at least 1 process")
-    names = [detector.name for detector in compared_plant(comparison.plant).detectors(comparison.noise)]
+    detectors = compared_plant(comparison.plant).detectors(comparison.noise)
+    names = [detector.name for detector in detectors]
     if len(set(names)) < len(names):
         raise ValueError(f"detectors are named {', '.join(names)}; expected different names")
     tasks = [(distribution, index) for distribution in comparison.distributions for index in range(len(names))]
@@ -99,7 +101,7 @@ def run_comparison(comparison: Comparison, workers: int = 1, progress: Progress 
         outcome[task] = result
         if progress is not None:
             progress(len(outcome), len(tasks))
-    compared = Compared(comparison)
+    compared = Compared(comparison, {detector.name: detector.kind for detector in detectors})
     for distribution, index in tasks:  # in this order whatever the workers did first
         tuned, rows = outcome[distribution, index]
         compared.tuned[distribution, names[index]] = tuned

@@ -1,75 +1,59 @@
-"""From a finished comparison to what people read: runs.csv, a picture and report.html."""
+"""From a finished comparison to what people read: two CSV files, a picture, and a few lines of text."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
-from html import escape
 from pathlib import Path
-from typing import Any
 
 from svo.comparison.comparison import Compared
-from svo.comparison.figures import write_comparison
-from svo.comparison.summary import DetectorComparison, summarise, write_runs
-from svo.comparison.tables import comparison_table
+from svo.comparison.picture import plot_comparison
+from svo.comparison.table import ComparisonRow, comparison_table, write_runs, write_table
 from svo.interval.study.run import LearnsDetectors
-from svo.plant import Plant
-from svo.study.configuration import versions
-from svo.study.figures import Picture
-from svo.study.report import html_facts, html_figure, html_table, write_page
-
-_GLOSSARY = {
-    "level": "The one knob of a detector: a factor on its threshold, or on the bounds of a set-membership model. It is "
-    "tuned to the false-alarm rate on training runs, unless the bounds are stated; judged runs have other seeds.",
-    "false alarms": "Judged fault-free runs with an alarm.",
-    "delay": "From the first faulty sample, which counts as one sampling time, to the first alarm, over the runs "
-    "without an alarm before the fault (early).",
-    "width": "Mean width of the detector's bounds on the state in fault-free runs.",
-    "alarm": "That of a set-valued observer with bounds that hold is a proof; that of the others, and of observers "
-    "whose bounds were scaled below what holds, is a crossed threshold.",
-}
+from svo.interval.study.run_figures import write_run_figures
+from svo.plant import Plant, fault_start
 
 
-def publish(compared: Compared, plant: Plant, folder: Path) -> list[DetectorComparison]:
-    """Write runs.csv, the pictures and report.html into a folder, which is made if need be."""
-    folder.mkdir(parents=True, exist_ok=True)
-    summaries = summarise(compared)
-    write_runs(folder / "runs.csv", compared.rows)
-    pictures = [write_comparison(folder / "delays.png", summaries)]
+def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[ComparisonRow]:
+    """Write comparison.csv, runs.csv and pictures into a folder; returns the table.
+
+    The pictures are comparison.png and, of a plant with interval detectors, runs of these (run_*.png).
+    """
+    import matplotlib
+
+    matplotlib.use("agg")
+    out.mkdir(parents=True, exist_ok=True)
+    rows = comparison_table(compared)
+    write_table(out / "comparison.csv", rows)
+    write_runs(out / "runs.csv", compared.rows)
+    longest = max(plant.duration(row.fault, row.profile) - fault_start(plant, row.fault, row.profile) for row in rows)
+    figure = plot_comparison(rows, compared.comparison.rate, plant.Ts, longest)
+    figure.savefig(out / "comparison.png", dpi=130)
     if isinstance(plant, LearnsDetectors):
-        from svo.interval.study.run_figures import write_run_figures
-
-        pictures += write_run_figures(folder, plant, compared.comparison.noise, compared.comparison.seed)
-    _write_report(folder / "report.html", compared, plant, summaries, pictures)
-    return summaries
+        write_run_figures(out, plant, compared.comparison.noise, compared.comparison.seed)
+    return rows
 
 
-def by_distribution(summaries: Sequence[DetectorComparison]) -> list[list[DetectorComparison]]:
-    """The summaries of each distribution of the noise."""
-    return [[s for s in summaries if s.distribution == d] for d in dict.fromkeys(s.distribution for s in summaries)]
+def to_text(rows: Sequence[ComparisonRow]) -> str:
+    """Median delays to the first alarm / to the right isolation [s], a line a detector and distribution."""
+    scenarios = list(dict.fromkeys((row.fault, row.profile) for row in rows))
+    table: dict[tuple[str, str], dict[tuple[str, str], ComparisonRow]] = {}
+    for row in rows:
+        table.setdefault((row.distribution, row.detector), {})[row.fault, row.profile] = row
+    width = max(len(row.detector) for row in rows)
+    head = f"{'':8}  {'':{width}}  {'false':>6}  {'us':>5}  " + "  ".join(f"{f'{f} {p}':>14}" for f, p in scenarios)
+    lines = ["median seconds to the first alarm / to isolate the right fault; - where half of the runs do not", head]
+    for (distribution, detector), cells in table.items():
+        one = next(iter(cells.values()))
+        cost = sorted(row.microseconds_per_sample for row in cells.values())[len(cells) // 2]
+        times = "  ".join(f"{_cell(cells[scenario]):>14}" for scenario in scenarios)
+        alarms = f"{100 * one.false_alarms.value:.1f}%"
+        lines.append(f"{distribution:8}  {detector:{width}}  {alarms:>6}  {cost:5.0f}  {times}")
+    return "\n".join(lines)
 
 
-def to_json(summaries: Sequence[DetectorComparison]) -> list[dict[str, Any]]:
-    """Summaries as plain dictionaries."""
-    return [asdict(s) for s in summaries]
+def _cell(row: ComparisonRow) -> str:
+    return f"{_seconds(row.detect.median)} / {_seconds(row.isolate.median)}"
 
 
-def _write_report(
-    path: Path,
-    compared: Compared,
-    plant: Plant,
-    summaries: Sequence[DetectorComparison],
-    pictures: Sequence[Picture],
-) -> None:
-    configuration = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(compared.comparison).items()}
-    parts = [
-        f"<h1>Detectors side by side: {escape(plant.title)}</h1>",
-        *(html_table(comparison_table(group)) for group in by_distribution(summaries)),
-        *(html_figure(picture) for picture in pictures),
-        "<h2>What is counted</h2>",
-        "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in _GLOSSARY.items()) + "</dl>",
-        "<p>Every judged run is a row of <code>runs.csv</code>.</p>",
-        html_facts("Configuration", configuration),
-        html_facts("Versions", versions()),
-    ]
-    write_page(path, f"Detectors side by side: {plant.title}", parts)
+def _seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

@@ -3,6 +3,7 @@
 Every test is a `ResidualTest`: ``run`` over an array, or ``start`` and one ``step`` a sample, with the same answers.
 """
 
+from svo.residual_tests.chi_square import ChiSquare
 from svo.residual_tests.cusum import CUSUM
 from svo.residual_tests.interface import Decision, DecisionRecord, OnlineTest, ResidualTest
 from svo.residual_tests.likelihood import GLR, SPRT
@@ -16,6 +17,7 @@ __all__ = [
     "GLR",
     "SPRT",
     "BoundedThreshold",
+    "ChiSquare",
     "Decision",
     "DecisionRecord",
     "OnlineTest",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.alarms import Alarm
+from svo.detect import source_of_bank
 from svo.isolation.record import Verdict
 from svo.log_columns import is_sampled, wrong_step
 from svo.log_csv import RowParser, csv_errors

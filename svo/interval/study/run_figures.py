@@ -50,7 +50,7 @@ def plot_run(ax: Axes, record: IntervalRecord, window: tuple[float, float] | Non
 
 def _record(plant: LearnsDetectors, fault: str, profile: str, noise: str, seed: int) -> IntervalRecord:
     """A run seen by the detector with the best pole of the paper's near-steady jam: the last but one."""
-    log = plant.simulate(fault, profile, noise, seed)  # type: ignore[attr-defined]
+    log = plant.simulate(fault, profile, noise, seed)
     learnt = plant.characterise([plant.learning_log(noise, s) for s in np.random.SeedSequence(seed).spawn(5)])
     detectors = plant.interval_detectors(learnt, float(log.u[0, 0]))
     return detectors[_chosen(detectors)].run(log)
@@ -101,7 +101,7 @@ def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Pi
         scenarios, figure.subplots(len(scenarios), 2, squeeze=False), strict=True
     ):
         record = _record(plant, fault, profile, noise, seed)
-        start = fault_start(plant, fault, profile)  # type: ignore[arg-type]
+        start = fault_start(plant, fault, profile)
         alarm = record.first_alarm_from(start)
         end = start + 0.5 if alarm is None else alarm
         margin = 0.6 * (end - start) + 0.1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from svo.residual_tests import CUSUM, GLR, SPRT, RandomizedSubsampling, StaticThreshold, StudentT
+from svo.residual_tests import CUSUM, GLR, SPRT, ChiSquare, RandomizedSubsampling, StaticThreshold, StudentT
 
 CONFIDENCE = 0.999
 SIZES = [20_000, pytest.param(1_000_000, marks=pytest.mark.slow)]
@@ -68,6 +68,15 @@ def test_subsampling_rate_holds_without_a_gaussian(shape):
         "scales that change": lambda: rng.standard_normal(size) * 10.0 ** rng.integers(-3, 4, size),
     }[shape]()
     alarms = test.run(residual).alarm[test.samples - 1 :: test.samples]
+    low, high = interval(alarms.sum(), alarms.size)
+    assert low <= test.false_alarm_rate <= high
+
+
+@pytest.mark.parametrize("windows", SIZES)
+def test_chi_square_of_innovations(windows):
+    test = ChiSquare(degrees=4, samples=5, false_alarm_rate=0.05)
+    squares = (np.random.default_rng(8).standard_normal((5 * windows, 4)) ** 2).sum(axis=1)
+    alarms = test.run(squares).alarm[4::5]
     low, high = interval(alarms.sum(), alarms.size)
     assert low <= test.false_alarm_rate <= high
 
