@@ -7,9 +7,10 @@ points of its distribution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -121,6 +122,24 @@ class StatesFaults(Protocol):
 
     def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
         """Each fault at the size of its first profile, with the bounds of a noise set."""
+        ...
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A picture that a plant adds to its study, and what it shows."""
+
+    path: Path
+    title: str
+    caption: str
+
+
+@runtime_checkable
+class AddsExhibits(Protocol):
+    """What a `Plant` offers besides if its study has more to show than the bank's times to detect and isolate."""
+
+    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
+        """Run the additional part of a study, write tables and pictures into its folder, return the pictures."""
         ...
 
 

@@ -65,7 +65,7 @@ def plot_trajectories(flights: Flights, seed: int, noise: str, ax: Axes) -> list
     ax.set(xlabel="x [km]", ylabel="y [km]", zlabel="height [km]")
     ax.set_title("Dots: a fault begins", fontsize="medium")
     ax.legend(loc="upper left", frameon=False)
-    ax.view_init(elev=22, azim=-120)  # type: ignore[attr-defined]
+    ax.view_init(elev=20, azim=-50)  # type: ignore[attr-defined]
     return artists
 
 
@@ -82,7 +82,8 @@ def plot_residual(flights: Flights, run: Run, scenario: Scenario, name: str, ax:
         artists.append(ax.axvline(start, color=FAULT, linestyle=(0, (4, 3)), linewidth=1.0))
         place = ax.get_xaxis_transform()
         artists.append(ax.text(start, 1.01, fault, transform=place, ha="center", va="bottom", fontsize="small"))
-    extent = 1.1 * float(np.nanmax(np.abs(scale * log[name][: round(70.0 / TS)])))
+    seen = slice(0, round(70.0 / TS))  # the last seconds, near the intercept, would hide the rest
+    extent = 1.1 * scale * max(float(np.nanmax(np.abs(log[name][seen]))), float(np.nanmax(bound[seen])))
     ax.set_ylim(-extent, extent)
     ax.set_xlim(0.0, DURATION)
     ax.set_ylabel(f"{name} [{unit}]")

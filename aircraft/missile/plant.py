@@ -1,0 +1,174 @@
+"""The missile as a plant of the studies (entry point ``missile``)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
+from aircraft.missile.models import OUTPUTS, Embedding, read_bounds
+from aircraft.missile.scenarios import DM, DN, ETA, TS, Fault, Flights, locked, noise_set, thrust_loss
+from polytopes import HPolytope
+from svo.faults import ActuatorFault, SensorFault, Step
+from svo.isolation.architectures import ArchitectureI
+from svo.isolation.bank import Bank
+from svo.log import Log
+from svo.model import UncertainModel
+from svo.observers.window import WindowObserver
+from svo.plant import HEALTHY, Column, Columns, Exhibit, Reference
+
+Array = NDArray[np.float64]
+
+STARTS, ENDS = 25.0, 40.0  # s of the flight that a log covers
+FAULT_TIME = 30.0
+ABZ = 2  # of the simulator's measurements
+ABZ_OUTPUT = OUTPUTS.index(ABZ)
+ACCELEROMETER_BIAS = 5.0  # m/s^2
+LARGEST_LOSS = 0.5  # that the propulsion observer allows
+FAULTS: Mapping[str, str] = MappingProxyType(
+    {
+        "propulsion": "a quarter of the propulsion rate is lost",
+        "pitch_fin": "the pitch fin locks",
+        "yaw_fin": "the yaw fin locks",
+        "accelerometer": "the normal accelerometer reads 5 m/s^2 too much",
+    }
+)
+PROFILE = "step"
+
+COLUMNS = Columns(
+    inputs=(Column("dl_rad", "rad"), Column("dm_rad", "rad"), Column("dn_rad", "rad"), Column("eta", "-")),
+    outputs=(
+        *(Column(f"{name}_m_s", "m/s") for name in ("vbx", "vby", "vbz")),
+        *(Column(f"{name}_m_s2", "m/s2") for name in ("abx", "aby", "abz")),
+        *(Column(f"{name}_rad_s", "rad/s") for name in ("p", "q", "r")),
+        Column("z_m", "m"),
+        Column("phi_rad", "rad"),
+        Column("theta_rad", "rad"),
+    ),
+    states=tuple(Column(f"true_{name}_m_s", "m/s") for name in ("vbx", "vby", "vbz")),
+)
+INITIAL = HPolytope.box([300.0, -200.0, -200.0], [900.0, 200.0, 200.0])
+
+
+@dataclass(frozen=True)
+class Missile:
+    """The surface-to-air missile of Marzat et al. (SysTol 2010) in closed loop, from 25 to 40 s of its flight.
+
+    Rows of a log are of the instant two samples before they are received, inputs included. The observers' bounds are
+    measured on these flights (`aircraft.missile.mismatch`): they promise nothing for a flight unlike them.
+
+    Parameters
+    ----------
+    flights : Flights
+    horizon : int
+        Steps in the observers' windows.
+    distribution : {"uniform", "gaussian"}, optional
+        Draws every noise set so, with its standard deviation, whatever its own distribution; the observers' bounds
+        stay those of the set.
+    """
+
+    flights: Flights = field(default_factory=Flights)
+    horizon: int = 10
+    distribution: Literal["uniform", "gaussian"] | None = None
+    name: str = "missile"
+    title: str = "Surface-to-air missile: propulsion, locked fins, accelerometer; residuals by redundancy"
+    Ts: float = TS
+    fault_time: float = FAULT_TIME
+    faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: {name: (PROFILE,) for name in FAULTS})
+    noise_sets: tuple[str, ...] = tuple(NOISE_SETS)
+    columns: Columns = COLUMNS
+    reference: Mapping[tuple[str, str], Reference] = field(default_factory=dict)
+    reference_title: str = "Marzat et al., SysTol 2010, gives no times"
+
+    def duration(self, fault: str, profile: str) -> float:
+        """Length of a run [s]; ``fault`` may be "none"."""
+        _check(fault, profile)
+        return ENDS - STARTS
+
+    def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
+        """One run with its true velocity; ``fault`` may be "none". The inputs are computed ones."""
+        _check(fault, profile)
+        run = self.flights.run(() if fault == HEALTHY else (fault_of(fault),), self._drawn(noise), seed, ENDS)
+        rows = slice(round(STARTS / TS), round(ENDS / TS))
+        then = slice(rows.start - DELAY, rows.stop - DELAY)
+        y = run.flight.y[rows][:, list(OUTPUTS)]
+        return Log(
+            time=run.time[rows], u=run.flight.computed[then], y=y, x=run.flight.x[then, 3:6], schedule=y
+        )
+
+    def models(self, noise: str) -> dict[str, UncertainModel]:
+        """The observers' models: "nominal", then one for each fault, which contains the healthy missile."""
+        errors, bounds = noise_set(noise), read_bounds()[noise]
+        embedding = Embedding(self.flights.airframe, self.Ts)
+        models = {"nominal": embedding.model(errors, bounds["nominal"])}
+        for name in self.faults:
+            models[name] = _observed(name).model(embedding.model(errors, bounds[name]))
+        return models
+
+    def bank(self, noise: str) -> Bank:
+        """A fresh isolation bank of window observers with box templates."""
+        observers = {name: WindowObserver(m, INITIAL, horizon=self.horizon) for name, m in self.models(noise).items()}
+        return ArchitectureI(observers.pop("nominal"), observers)
+
+    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+        """A fresh filter: the schedule is the output, with the last value of a sensor that is missing."""
+        last = np.array([np.nan] * len(OUTPUTS))
+
+        def schedule(y: NDArray[np.float64]) -> NDArray[np.float64]:
+            last[:] = np.where(np.isnan(y), last, y)
+            return last.copy()
+
+        return schedule
+
+    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> list[Exhibit]:
+        """The residuals' part of a study: scenarios of Table II over seeds, written into its folder."""
+        from aircraft.missile.figures import write_figures
+        from aircraft.missile.scenario_study import run_study
+
+        study = run_study(runs, seed, noise, self.flights)
+        study.write(folder)
+        caption = "Flight with the first seed; dashed lines: a fault begins. Tables: scenarios.txt, scenario_*.csv."
+        pictures = write_figures(folder, self.flights, seed, noise[0])
+        return [Exhibit(path, title, caption) for title, path in pictures.items()]
+
+    def _drawn(self, noise: str) -> SensorErrors:
+        errors = noise_set(noise)
+        return errors if self.distribution is None else replace(errors, distribution=self.distribution)
+
+
+def fault_of(name: str) -> Fault:
+    """The fault that a simulated flight has from `FAULT_TIME` on."""
+    if name == "propulsion":
+        return thrust_loss(0.25, FAULT_TIME)
+    if name == "pitch_fin":
+        return locked(DM, FAULT_TIME)
+    if name == "yaw_fin":
+        return locked(DN, FAULT_TIME)
+    if name == "accelerometer":
+        return SensorFault(ABZ, "bias", ACCELEROMETER_BIAS, Step(FAULT_TIME))
+    raise ValueError(f"fault is {name!r}; expected one of {', '.join(FAULTS)}")
+
+
+def _observed(name: str) -> ActuatorFault | SensorFault:
+    """The fault as an observer allows for it: larger, and by the observer's own channels."""
+    fault = fault_of(name)
+    if isinstance(fault, SensorFault):
+        return replace(fault, where=ABZ_OUTPUT)
+    return replace(fault, magnitude=LARGEST_LOSS) if fault.where == ETA else fault
+
+
+def _check(fault: str, profile: str) -> None:
+    expected = HEALTHY if fault == HEALTHY else PROFILE
+    if profile != expected:
+        raise ValueError(f"profile is {profile!r} for fault {fault!r}; expected {expected!r}")
+
+
+def missile() -> Missile:
+    """The plant that is registered."""
+    return Missile()
