@@ -88,5 +88,3 @@ def plot_residual(flights: Flights, run: Run, scenario: Scenario, name: str, ax:
     ax.set_xlim(0.0, DURATION)
     ax.set_ylabel(f"{name} [{unit}]")
     return artists
-
-

@@ -45,7 +45,9 @@ class SensorErrors:
 
     def __post_init__(self) -> None:
         if self.distribution not in get_args(Distribution):
-            raise ValueError(f"distribution is {self.distribution!r}; expected one of {', '.join(get_args(Distribution))}")
+            raise ValueError(
+                f"distribution is {self.distribution!r}; expected one of {', '.join(get_args(Distribution))}"
+            )
         for name in ("scale", "bias", "sigma"):
             array = np.array(getattr(self, name), dtype=float)
             if array.shape != (15,) or not np.isfinite(array).all() or (array < 0).any():

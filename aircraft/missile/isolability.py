@@ -79,9 +79,7 @@ def diagnoses(conflicts: Sequence[FaultSet | frozenset[str]]) -> tuple[FaultSet,
     """
     members = sorted(set(chain.from_iterable(conflicts)), key=lambda name: (INPUTS + (name,)).index(name))
     for size in range(len(members) + 1):
-        found = tuple(
-            chosen for chosen in combinations(members, size) if all(set(chosen) & set(c) for c in conflicts)
-        )
+        found = tuple(chosen for chosen in combinations(members, size) if all(set(chosen) & set(c) for c in conflicts))
         if found:
             return found
     return ()

@@ -47,14 +47,10 @@ def largest(flights: Flights, noise: str, faults: tuple[Fault, ...], branch: int
     embedding, errors = Embedding(flights.airframe, TS), NOISE_SETS[noise]
     key = (SPAWN_KEY, list(NOISE_SETS).index(noise), branch)
     seen = [
-        mismatch(
-            flights.run(faults, errors, np.random.SeedSequence(0, spawn_key=(*key, i)), ENDS), embedding, errors
-        )
+        mismatch(flights.run(faults, errors, np.random.SeedSequence(0, spawn_key=(*key, i)), ENDS), embedding, errors)
         for i in range(runs)
     ]
-    return MismatchBounds(
-        **{name: MARGIN * np.max([getattr(s, name) for s in seen], axis=0) for name in vars(seen[0])}
-    )
+    return MismatchBounds(**{name: MARGIN * np.max([getattr(s, name) for s in seen], axis=0) for name in vars(seen[0])})
 
 
 def measure(flights: Flights, runs: int) -> dict[str, dict[str, MismatchBounds]]:

@@ -80,7 +80,7 @@ class Missile:
     title: str = "Surface-to-air missile: propulsion, locked fins, accelerometer; residuals by redundancy"
     Ts: float = TS
     fault_time: float = FAULT_TIME
-    faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: {name: (PROFILE,) for name in FAULTS})
+    faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: dict.fromkeys(FAULTS, (PROFILE,)))
     noise_sets: tuple[str, ...] = tuple(NOISE_SETS)
     columns: Columns = COLUMNS
     reference: Mapping[tuple[str, str], Reference] = field(default_factory=dict)
@@ -98,9 +98,7 @@ class Missile:
         rows = slice(round(STARTS / TS), round(ENDS / TS))
         then = slice(rows.start - DELAY, rows.stop - DELAY)
         y = run.flight.y[rows][:, list(OUTPUTS)]
-        return Log(
-            time=run.time[rows], u=run.flight.computed[then], y=y, x=run.flight.x[then, 3:6], schedule=y
-        )
+        return Log(time=run.time[rows], u=run.flight.computed[then], y=y, x=run.flight.x[then, 3:6], schedule=y)
 
     def models(self, noise: str) -> dict[str, UncertainModel]:
         """The observers' models: "nominal", then one for each fault, which contains the healthy missile."""

@@ -116,12 +116,15 @@ class ForceBalance:
         alpha, beta = np.arctan2(vz, vx), np.arctan2(vy, vx)
         cx, cx_l, cx_m, cx_n, cy, cy_l, cy_n, cz, cz_m = force_coefficients(alpha, beta, p)
         S = dynamic_pressure(measured[:, 8], vx, vy, vz, p) * airframe.reference_area / airframe.mass
-        f = measured[:, ACCELERATION] + np.column_stack(
-            [S * cx - airframe.thrust_min / airframe.mass, -S * cy, S * cz]
-        )
+        f = measured[:, ACCELERATION] + np.column_stack([S * cx - airframe.thrust_min / airframe.mass, -S * cy, S * cz])
         G = np.zeros((len(measured), 3, 4))
         G[:, 0] = np.column_stack(
-            [-S * cx_l, -S * cx_m, -S * cx_n, np.full_like(S, (airframe.thrust_max - airframe.thrust_min) / airframe.mass)]
+            [
+                -S * cx_l,
+                -S * cx_m,
+                -S * cx_n,
+                np.full_like(S, (airframe.thrust_max - airframe.thrust_min) / airframe.mass),
+            ]
         )
         G[:, 1, DL], G[:, 1, DN], G[:, 2, DM] = S * cy_l, S * cy_n, -S * cz_m
         return cls(f, G)

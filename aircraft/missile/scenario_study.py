@@ -34,7 +34,10 @@ NEAR_INTERCEPT = 63.0  # s, from which on the geometry changes fast
 RULES = ("fixed", "adaptive")
 HEALTHY = "healthy"
 MAGNITUDES: dict[str, Scenario] = {
-    **{f"eta -{100 * part:g} %": Scenario((thrust_loss(part, 30.0),), ("r14",)) for part in (0.05, 0.1, 0.25, 0.5, 0.75)},
+    **{
+        f"eta -{100 * part:g} %": Scenario((thrust_loss(part, 30.0),), ("r14",))
+        for part in (0.05, 0.1, 0.25, 0.5, 0.75)
+    },
     "dm locked at 30 s": Scenario((locked(DM, 30.0),), ("r32",)),
     "dm locked at 50 s": Scenario((locked(DM, 50.0),), ("r32",)),
     "dn locked at 30 s": Scenario((locked(DN, 30.0),), ("r23",)),
@@ -198,9 +201,7 @@ def _order_row(simulator: Flights, run: Run, scenario: Scenario, name: str, nois
         contained = contained and fault.lower <= size <= fault.upper
     true_order = tuple(fault for _, fault in scenario.events)
     wrong = found.order != true_order[: len(found.order)]
-    return OrderRow(
-        name, noise, seed, " ".join(true_order), " ".join(found.order), wrong, " ".join(delays), contained
-    )
+    return OrderRow(name, noise, seed, " ".join(true_order), " ".join(found.order), wrong, " ".join(delays), contained)
 
 
 def _delay_text(rows: Sequence[ResidualRow]) -> str:
@@ -219,9 +220,10 @@ def _delay_text(rows: Sequence[ResidualRow]) -> str:
         if delays:
             shown = f"{np.median(delays):.2f} ({min(delays):.2f} to {max(delays):.2f})"
         reached = "" if quiet else f"{len(delays)}/{len(group)}"
-        false, late = (sum(v > 0 for v in column) for column in zip(
-            *((row.false_alarms, row.late_false_alarms) for row in group), strict=True
-        ))
+        false, late = (
+            sum(v > 0 for v in column)
+            for column in zip(*((row.false_alarms, row.late_false_alarms) for row in group), strict=True)
+        )
         lines.append(
             f"{scenario:<19}{noise:<10}{residual:<10}{rule:<10}{reached:<10}{shown:<22}"
             f"{f'{false}/{len(group)}':<8}{f'{late}/{len(group)}'}"

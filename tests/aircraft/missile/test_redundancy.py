@@ -85,7 +85,10 @@ def test_ten_patterns_for_sixteen_fault_sets() -> None:
     assert len(table.groups) == 10
     group = {frozenset(s) for s in (("dl", "dn"), ("dl", "eta"), ("dn", "eta"), ("dl", "dn", "eta"))}
     with_dm = {s | {"dm"} for s in group}
-    assert {frozenset(frozenset(s) for s in sets) for sets in table.coinciding} == {frozenset(group), frozenset(with_dm)}
+    assert {frozenset(frozenset(s) for s in sets) for sets in table.coinciding} == {
+        frozenset(group),
+        frozenset(with_dm),
+    }
     assert "10 patterns for 16 fault sets" in table.to_text()
 
 
