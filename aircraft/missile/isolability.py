@@ -66,7 +66,7 @@ def isolability_table(
         raise ValueError(f"signature has shape {matrix.shape}; expected ({len(residuals)}, {len(names)})")
     groups: dict[tuple[bool, ...], list[FaultSet]] = {}
     for chosen in _subsets(len(names)):
-        pattern = tuple(bool(v) for v in matrix[:, list(chosen)].any(axis=1))
+        pattern = tuple(bool(row[list(chosen)].any()) for row in matrix)
         groups.setdefault(pattern, []).append(tuple(names[i] for i in chosen))
     return IsolabilityTable(tuple(names), tuple(residuals), tuple((p, tuple(s)) for p, s in groups.items()))
 
@@ -77,7 +77,7 @@ def diagnoses(conflicts: Sequence[FaultSet | frozenset[str]]) -> tuple[FaultSet,
     A residual that left its bounds is one: at least one fault on which it depends is present. None without conflicts
     but the empty set; none at all if a conflict is empty.
     """
-    members = sorted(set(chain.from_iterable(conflicts)), key=lambda name: (INPUTS + (name,)).index(name))
+    members = sorted(set(chain.from_iterable(conflicts)), key=lambda name: (*INPUTS, name).index(name))
     for size in range(len(members) + 1):
         found = tuple(chosen for chosen in combinations(members, size) if all(set(chosen) & set(c) for c in conflicts))
         if found:

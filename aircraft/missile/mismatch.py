@@ -70,8 +70,8 @@ def to_toml(bounds: Mapping[str, Mapping[str, MismatchBounds]], runs: int) -> st
     """The text of the bounds file."""
     lines = [
         "# Measured, not written by hand: what the observers' embedding leaves out of the simulator,",
-        f"# {MARGIN} times the largest value seen in {runs} flights without and with each fault (at least the fault-free",
-        f"# bound), from {STARTS:g} to {ENDS:g} s.  python -m aircraft.missile.mismatch --runs {runs}",
+        f"# {MARGIN} times the largest value seen in {runs} flights without and with each fault (at least the",
+        f"# fault-free bound), from {STARTS:g} to {ENDS:g} s.  python -m aircraft.missile.mismatch --runs {runs}",
         "# force, output: m/s^2 in x, y, z; velocity: m/s per sample",
     ]
     for noise, observers in bounds.items():

@@ -108,7 +108,7 @@ class Flights:
     ) -> Run:
         """One flight; the same seed gives the same sensor errors and airframe whatever the faults."""
         samples = round(duration / TS)
-        time = np.arange(samples) * TS
+        time = np.arange(samples, dtype=np.float64) * TS
         rng, airframe_rng = np.random.default_rng(seed).spawn(2)
         true = self.airframe.perturbed(self.model_error, airframe_rng) if self.model_error else self.airframe
         flight = fly(

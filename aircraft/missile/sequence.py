@@ -8,7 +8,7 @@ fault shows as if it were the first. Assumed: no two faults begin within one iso
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -170,19 +170,17 @@ class _Search:
     def open_explanations(
         self, alarms: NDArray[np.bool_], start: int, found: Mapping[str, SequentialFault]
     ) -> tuple[tuple[str, ...], ...]:
-        last: list[frozenset[str]] = []
-        for _, last in self._conflicts(alarms, start, found):
-            pass
-        return diagnoses(last) if last else ()
+        events = list(self._conflicts(alarms, start, found))
+        return diagnoses(events[-1][1]) if events else ()
 
-    def _conflicts(  # type: ignore[no-untyped-def]
+    def _conflicts(
         self, alarms: NDArray[np.bool_], start: int, found: Mapping[str, SequentialFault]
-    ):
+    ) -> Iterator[tuple[int, list[frozenset[str]]]]:
         """(sample, all conflicts so far) at each sample at which a residual alarms for the first time."""
         seen = [(int(np.argmax(column)) + start, r) for r, column in enumerate(alarms[start:].T) if column.any()]
         conflicts: list[frozenset[str]] = []
         for k in sorted({sample for sample, _ in seen}):
-            conflicts = conflicts + [self.supports[r] - found.keys() for sample, r in seen if sample == k]
+            conflicts = [*conflicts, *(self.supports[r] - found.keys() for sample, r in seen if sample == k)]
             yield k, conflicts
 
     def identified(

@@ -148,7 +148,9 @@ def fly(
         For shapes that do not fit, a delay below one, or a state that leaves the finite numbers.
     """
     samples = len(error)
-    shapes = {name: (samples, 15 if name.startswith("sensor") else 4) for name in vars(corruption)}
+    shapes: dict[str, tuple[int, ...]] = {
+        name: (samples, 15 if name.startswith("sensor") else 4) for name in vars(corruption)
+    }
     arrays = {"error": error, "scale": scale, "start": start, **vars(corruption)}
     shapes |= {"error": (samples, N_MEASUREMENTS), "scale": (N_MEASUREMENTS,), "start": (12,)}
     for name, array in arrays.items():
