@@ -7,7 +7,7 @@ from aircraft.missile.adaptive import ModelError
 from aircraft.missile.airframe import INPUTS
 from aircraft.missile.imu import NOISE_SETS
 from aircraft.missile.scenarios import DL, DM, DN, SCENARIOS, TS, Flights, Run, locked, thrust_loss
-from aircraft.missile.sequence import FaultSequence, isolate_in_order
+from aircraft.missile.sequence import FaultSequence, SequentialFault, _Search, isolate_in_order
 from svo.faults import ActuatorFault, Step
 
 FLIGHTS = Flights()
@@ -62,3 +62,17 @@ def test_a_fault_of_another_kind_is_not_explained() -> None:
     found = _isolate(run)
     assert found.unexplained_at is not None or found.faults[0].lower > 1.0
     assert np.isfinite(run.flight.x).all()
+
+
+@pytest.mark.parametrize("end", ["lower", "upper"])
+def test_a_known_fault_is_quiet_wherever_in_its_bounds_the_truth_lies(end: str) -> None:
+    """What is left open of a known fault's size is added to the bounds of all residuals."""
+    run = FLIGHTS.run((thrust_loss(0.25, 10.0), locked(DN, 10.0)), NOISE_SETS["bounded"], 0, 20.0)
+    search = _Search.over(run.flight.y, run.aligned_inputs, FLIGHTS.airframe, ModelError(run.errors))
+    position, factor = run.flight.achieved[1500, DN], 0.75
+    spread = {"lower": (0.0, 1.0), "upper": (-1.0, 0.0)}[end]
+    known = {
+        "eta": SequentialFault("eta", "loss", 1002, 1002, factor + 0.2 * spread[0], factor + 0.2 * spread[1]),
+        "dn": SequentialFault("dn", "locking", 1002, 1002, position + 0.1 * spread[0], position + 0.1 * spread[1]),
+    }
+    assert not search.alarms(known)[1010:].any()
