@@ -131,7 +131,7 @@ class Missile:
 
         study = run_study(runs, seed, noise, self.flights)
         study.write(folder)
-        caption = "Flight with the first seed; dashed lines: a fault begins. Tables: scenarios.txt, scenario_*.csv."
+        caption = "A flight with the seed of the study; dashed lines: a fault begins. Tables: scenarios.txt, scenario_*.csv."
         pictures = write_figures(folder, self.flights, seed, noise[0])
         return [Exhibit(path, title, caption) for title, path in pictures.items()]
 
