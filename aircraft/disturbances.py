@@ -1,10 +1,11 @@
-"""Bounded, band-limited noise: what the paper calls band-limited white noise, with the bounds that a
-set-membership observer needs."""
+"""Band-limited noise: what the paper calls band-limited white noise, with the bounds that a set-membership
+observer needs, or Gaussian, to see what becomes of observers whose bounds do not hold."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,33 +14,41 @@ from scipy.signal import butter, sosfilt
 Array = NDArray[np.float64]
 
 RMS_PER_BOUND = 1 / 2.5
+Distribution = Literal["bounded", "gaussian"]
 _SETTLING_PERIODS = 6.0  # of the cut-off: a second-order Butterworth has decayed by exp(-27) then
 
 
 @dataclass(frozen=True)
 class BandLimitedNoise:
-    """Uniform white noise through a second-order Butterworth low-pass, scaled and clipped, per channel.
+    """White noise through a second-order Butterworth low-pass, scaled to an rms, per channel.
+
+    Bounded: uniform white noise, and the scaled output clipped at the bounds. Gaussian: Gaussian white noise, the
+    same rms, nothing clipped; 1.2 % of its samples lie outside the bounds.
 
     Parameters
     ----------
     bounds : (channels,) array
-        Half-widths >= 0. The rms before clipping is bound / 2.5; no sample exceeds the bound.
+        Half-widths >= 0. The rms before clipping is bound / 2.5; no sample exceeds the bound unless Gaussian.
     cutoffs_hz : (channels,) array
         Cut-off frequencies, below half of the sampling frequency.
     Ts : float
         Sampling time [s].
+    distribution : {"bounded", "gaussian"}
 
     Raises
     ------
     ValueError
-        For shapes that differ, a negative bound, or a cut-off outside (0, 0.5 / Ts).
+        For shapes that differ, a negative bound, an unknown distribution, or a cut-off outside (0, 0.5 / Ts).
     """
 
     bounds: ArrayLike
     cutoffs_hz: ArrayLike
     Ts: float
+    distribution: Distribution = "bounded"
 
     def __post_init__(self) -> None:
+        if self.distribution not in ("bounded", "gaussian"):
+            raise ValueError(f"distribution is {self.distribution!r}; expected 'bounded' or 'gaussian'")
         bounds, cutoffs = np.array(self.bounds, dtype=float), np.array(self.cutoffs_hz, dtype=float)
         if bounds.ndim != 1 or bounds.shape != cutoffs.shape:
             shapes = f"bounds has shape {bounds.shape} and cutoffs_hz {cutoffs.shape}"
@@ -60,12 +69,16 @@ class BandLimitedNoise:
         """
         filters = [_low_pass(float(cutoff), self.Ts) for cutoff in np.asarray(self.cutoffs_hz)]
         settling = max((length for _, length, _ in filters), default=0)
-        coloured = rng.uniform(-1.0, 1.0, (settling + samples, len(filters)))
+        shape = (settling + samples, len(filters))
+        bounded = self.distribution == "bounded"
+        # The variance of a uniform variable on [-1, 1] is 1/3.
+        coloured = rng.uniform(-1.0, 1.0, shape) if bounded else rng.standard_normal(shape) / np.sqrt(3.0)
         for column, (sections, _, _) in zip(coloured.T, filters, strict=True):
             column[:] = sosfilt(sections, column)
         gains = np.array([gain for _, _, gain in filters])
         bounds = np.asarray(self.bounds)
-        return np.clip(coloured[settling:] * (RMS_PER_BOUND * bounds / gains), -bounds, bounds)
+        noise: Array = coloured[settling:] * (RMS_PER_BOUND * bounds / gains)
+        return np.clip(noise, -bounds, bounds) if bounded else noise
 
 
 @cache

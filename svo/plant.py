@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,11 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
+
 HEALTHY = "none"
+Distribution = Literal["bounded", "gaussian"]
 
 
 @dataclass(frozen=True)
@@ -140,6 +144,28 @@ class AddsExhibits(Protocol):
 
     def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
         """Run the additional part of a study, write tables and pictures into its folder, return the pictures."""
+        ...
+
+
+@runtime_checkable
+class ComparesDetectors(Protocol):
+    """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.
+
+    Attributes
+    ----------
+    compared_faults : tuple of (fault, profile)
+        The scenarios of the comparison.
+    """
+
+    compared_faults: tuple[tuple[str, str], ...]
+
+    def with_noise(self, distribution: Distribution) -> Plant:
+        """This plant with its noise drawn "bounded" (within the bounds of the noise set), or "gaussian" (the same
+        rms, unbounded); models and bounds stay as they are."""
+        ...
+
+    def detectors(self, noise: str) -> Sequence[Detector]:
+        """The detectors to compare with one noise set; their names differ."""
         ...
 
 

@@ -29,7 +29,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.disturbances import BandLimitedNoise
+from aircraft.disturbances import BandLimitedNoise, Distribution
 
 Array = NDArray[np.float64]
 
@@ -52,10 +52,12 @@ class NoiseSet:
     sensors: tuple[float, float, float, float]
     gusts: tuple[float, float, float]
 
-    def draw(self, samples: int, Ts: float, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Sensor noise (samples, 4) and gusts (samples, 3), each within its bounds."""
+    def draw(
+        self, samples: int, Ts: float, rng: np.random.Generator, distribution: Distribution = "bounded"
+    ) -> tuple[Array, Array]:
+        """Sensor noise (samples, 4) and gusts (samples, 3), each within its bounds unless Gaussian."""
         cutoffs = (*(SENSOR_CUTOFF_HZ,) * len(self.sensors), *GUST_CUTOFFS_HZ)
-        drawn = BandLimitedNoise((*self.sensors, *self.gusts), cutoffs, Ts).draw(samples, rng)
+        drawn = BandLimitedNoise((*self.sensors, *self.gusts), cutoffs, Ts, distribution).draw(samples, rng)
         return drawn[:, :4], drawn[:, 4:]
 
 

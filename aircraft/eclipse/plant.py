@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,10 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
-from svo.plant import Column, Columns, Reference, StatedFault
+from svo.plant import Column, Columns, Distribution, Reference, StatedFault
+
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
 
 Array = NDArray[np.float64]
 
@@ -62,6 +65,8 @@ INITIAL_LOWER = (15.0, -15.0, -0.8, -2.0)
 INITIAL_UPPER = (65.0, 25.0, 0.8, 2.0)
 
 
+COMPARED_FAULTS = tuple((fault, profile) for fault in FAULTS for profile in ("step", "soft"))
+
 STATED: Mapping[str, str] = MappingProxyType(
     {
         "alpha": "alpha reads 3 deg too much",
@@ -98,6 +103,7 @@ class Eclipse:
     faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: {name: tuple(PROFILES) for name in FAULTS})
     noise_sets: tuple[str, ...] = tuple(NOISE_SETS)
     columns: Columns = COLUMNS
+    compared_faults: tuple[tuple[str, str], ...] = COMPARED_FAULTS
     reference: Mapping[tuple[str, str], Reference] = field(default_factory=lambda: REFERENCE)
     reference_title: str = (
         "Rosa and Silvestre, Control Engineering Practice 21 (2013), section 6: "
@@ -153,6 +159,17 @@ class Eclipse:
         if self.architecture == "II":
             return ArchitectureII(nominal, observers, global_=initial)
         return ArchitectureI(nominal, observers)
+
+    def with_noise(self, distribution: Distribution) -> Eclipse:
+        """This aircraft with bounded or Gaussian noise and gusts of the same rms; models and bounds are unchanged."""
+        return replace(self, scenarios=replace(self.scenarios, distribution=distribution))
+
+    def detectors(self, noise: str) -> list[Detector]:
+        """What ``svo compare eclipse`` sets side by side; see `aircraft.eclipse.detectors`."""
+        from aircraft.eclipse.detectors import detectors
+
+        stated = {name: fault.model for name, fault in self.stated_faults(noise).items()}
+        return detectors(self.models(noise), stated, HPolytope.box(INITIAL_LOWER, INITIAL_UPPER))
 
     def scheduler(self) -> AirspeedFilter:
         """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""

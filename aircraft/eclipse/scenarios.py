@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.disturbances import Distribution
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, design_autopilot
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.models import SPEED_MOMENT_INCREASE, ScheduledModel
@@ -68,9 +69,12 @@ class Scenarios:
     ----------
     model : ScheduledModel
         Gives the surrogate, the derivatives, and the direction of the dynamics fault.
+    distribution : {"bounded", "gaussian"}
+        Of all noises and gusts: within the bounds of the noise set, or Gaussian of the same rms, which leaves them.
     """
 
     model: ScheduledModel = field(default_factory=lambda: ScheduledModel(TS))
+    distribution: Distribution = "bounded"
 
     def fault(self, name: str, profile: str) -> Fault:
         """The fault object that both corrupts a flight and gives its observer's model.
@@ -103,7 +107,8 @@ class Scenarios:
         samples = round(self.duration(fault, profile) / self.model.Ts)
         time = np.arange(samples, dtype=np.float64) * float(self.model.Ts)
         active = None if fault == HEALTHY else self.fault(fault, profile)
-        sensor_noise, gusts = NOISE_SETS[_known(noise)].draw(samples, self.model.Ts, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        sensor_noise, gusts = NOISE_SETS[_known(noise)].draw(samples, self.model.Ts, rng, self.distribution)
         corruption = corrupt(active, time, self.model.moment_reference)
         start = level_trim(self.model.surrogate, DESIGN_AIRSPEED).x
         controller = _autopilot(noise, self.model.Ts, self.model.surrogate)

@@ -1,0 +1,132 @@
+"""The linear Gaussian model that stands for an uncertain one: bounds become variances, uncertainties their middle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo.log import Log
+from svo.model import UncertainModel
+
+Array = NDArray[np.float64]
+VARIANCE_OF_BOUND = 1.0 / 3.0  # of a uniform variable on [-1, 1]
+
+
+class Sample(NamedTuple):
+    """x(k+1) = A x + f + noise of covariance Q;  y(k) = C x + g + noise of covariance R, at one sample."""
+
+    A: Array
+    f: Array
+    Q: Array
+    C: Array
+    g: Array
+    R: Array
+
+
+@dataclass(frozen=True)
+class GaussianSamples:
+    """The model along a log of K samples: A (K, n, n), f (K, n), Q (K, n, n), C (K, ny, n), g (K, ny), R (K, ny, ny),
+    and the measurements y (K, ny)."""
+
+    A: Array
+    f: Array
+    Q: Array
+    C: Array
+    g: Array
+    R: Array
+    y: Array
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def arrays(self) -> tuple[Array, ...]:
+        """All of them, in this order."""
+        return tuple(getattr(self, f.name) for f in fields(self))
+
+
+@dataclass(frozen=True)
+class GaussianModel:
+    """A linear (parameter-varying) model with Gaussian noise.
+
+    Variances are those of uniform variables within the bounds of the uncertain model, disturbances have the mean
+    in the middle of their bounds, and each uncertainty keeps to the middle of its interval.
+
+    Parameters
+    ----------
+    model : UncertainModel
+    initial : HPolytope
+        Bounded set of the state at the first sample; its bounding box gives mean and variance there.
+
+    Raises
+    ------
+    ValueError
+        If disturbances enter the output (F, F_i), or the initial set is unbounded or empty.
+    """
+
+    model: UncertainModel
+    initial: HPolytope
+    mean: Array = field(init=False, repr=False)
+    covariance: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.model.n_disturbances and np.any(self._at(self.model.schedule, "F")):
+            raise ValueError("model has disturbances in its output (F); expected them in the state equation only")
+        lower, upper = self.initial.bounding_box()
+        if not (np.isfinite(lower).all() and np.isfinite(upper).all() and (lower <= upper).all()):
+            raise ValueError(f"initial is between {lower} and {upper}; expected a bounded set that is not empty")
+        object.__setattr__(self, "mean", (lower + upper) / 2)
+        object.__setattr__(self, "covariance", np.diag(VARIANCE_OF_BOUND * ((upper - lower) / 2) ** 2 + 1e-12))
+
+    def sample(self, u: Array, schedule: Any) -> Sample:
+        """The model at one sample, driven by u (nu,)."""
+        layout = self.model.layout
+        total = self._stack(schedule)
+        lower, upper, noise = self.model.bounds(schedule)
+        E = total[layout.block("E")]
+        state, output = total[: layout.n], total[layout.n :]
+        known = slice(layout.n, layout.n + layout.nu)
+        variance = VARIANCE_OF_BOUND * ((upper - lower) / 2) ** 2
+        return Sample(
+            A=state[:, : layout.n],
+            f=state[:, known] @ u + state[:, layout.n + layout.nu] + E @ ((lower + upper) / 2),
+            Q=(E * variance) @ E.T,
+            C=output[:, : layout.n],
+            g=output[:, known] @ u + output[:, layout.n + layout.nu],
+            R=np.diag(VARIANCE_OF_BOUND * np.asarray(noise) ** 2),
+        )
+
+    def samples(self, log: Log) -> GaussianSamples:
+        """The model along a log.
+
+        Raises
+        ------
+        ValueError
+            If the log has other channels than the model.
+        """
+        wanted = (self.model.n_inputs, self.model.n_outputs)
+        if (log.u.shape[1], log.y.shape[1]) != wanted:
+            raise ValueError(f"log has {log.u.shape[1]} inputs and {log.y.shape[1]} outputs; expected {wanted}")
+        each = [self.sample(log.u[k], log.schedule_at(k)) for k in range(len(log))]
+        A, f, Q, C, g, R = (np.array([getattr(sample, name) for sample in each]) for name in Sample._fields)
+        return GaussianSamples(A, f, Q, C, g, R, log.y)
+
+    def _stack(self, schedule: Any) -> Array:
+        stack = self.model.stack(schedule)
+        total = stack[0]
+        for item, uncertainty in zip(stack[1:], self.model.uncertainties, strict=True):
+            total = total + (uncertainty.bounds[0] + uncertainty.bounds[1]) / 2 * item
+        return total
+
+    def _at(self, schedule: Any, name: str) -> Array:
+        return np.asarray(self.model.stack(schedule)[(slice(None), *self.model.layout.block(name))])
+
+
+def fault_effect(nominal: GaussianSamples, faulty: GaussianSamples, x: Array) -> tuple[Array, Array]:
+    """What a fault of the size in ``faulty`` adds to the next state (K, n) and to the output (K, ny), at states x."""
+    state = np.einsum("kij,kj->ki", faulty.A - nominal.A, x) + faulty.f - nominal.f
+    output = np.einsum("kij,kj->ki", faulty.C - nominal.C, x) + faulty.g - nominal.g
+    return state, output

@@ -1,0 +1,86 @@
+"""A bank of Kalman filters with probabilities: interacting multiple models, and MMAE without switching."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.baselines.filter_kernel import multiple_models
+from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
+from svo.log import Log
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModelProbabilities:
+    """Over K samples: posterior (K, m) of each model, and log_odds (K,) of all but the first one together."""
+
+    names: tuple[str, ...]
+    posterior: Array
+    log_odds: Array
+
+
+@dataclass(frozen=True)
+class MultipleModelFilter:
+    """One Kalman filter a model, and the probability of each (Blom and Bar-Shalom 1988).
+
+    Parameters
+    ----------
+    models : mapping of str to GaussianModel
+        At least two; the first is the plant without a fault, from which any may be switched to and back.
+    switching : float
+        Probability in [0, 1) of leaving a model at a sample, shared by the others. Zero is MMAE, whose models
+        never mix.
+    process_noise : float
+        Factor on the covariance of the process noise, for tuning.
+
+    Raises
+    ------
+    ValueError
+        For fewer than two models, or a number out of its range.
+    """
+
+    models: Mapping[str, GaussianModel]
+    switching: float = 1e-3
+    process_noise: float = 1.0
+
+    def __post_init__(self) -> None:
+        if len(self.models) < 2:
+            raise ValueError(f"models has {len(self.models)}; expected at least two, the first without a fault")
+        if not 0 <= self.switching < 1:
+            raise ValueError(f"switching is {self.switching}; expected a probability in [0, 1)")
+        if not (np.isfinite(self.process_noise) and self.process_noise > 0):
+            raise ValueError(f"process_noise is {self.process_noise}; expected a positive factor")
+
+    @property
+    def transition(self) -> Array:
+        """Probability (m, m) of going from each model to each."""
+        m = len(self.models)
+        matrix = np.full((m, m), self.switching / (m - 1))
+        np.fill_diagonal(matrix, 1 - self.switching)
+        return matrix
+
+    def run(self, log: Log) -> ModelProbabilities:
+        """All samples of a log."""
+        return self.over([model.samples(log) for model in self.models.values()])
+
+    def over(self, samples: list[GaussianSamples]) -> ModelProbabilities:
+        """The same where the models along the log are known already, in the order of the models."""
+        m, K = len(samples), len(samples[0])
+        first = next(iter(self.models.values()))
+        xs = np.repeat(first.mean[None], m, axis=0)
+        Ps = np.repeat(first.covariance[None], m, axis=0)
+        before = np.maximum(np.arange(K) - 1, 0)  # each measurement follows from the sample before
+        A, f, Q = (np.array([getattr(s, name)[before] for s in samples]) for name in ("A", "f", "Q"))
+        C, g, R = (np.array([getattr(s, name) for s in samples]) for name in ("C", "g", "R"))
+        log_odds, posterior = np.empty(K), np.empty((K, m))
+        probability = np.full(m, 1 / m)
+        multiple_models(
+            xs, Ps, probability, True, self.transition, A, f, self.process_noise * Q, C, g, R, samples[0].y,
+            log_odds, posterior,
+        )  # fmt: skip
+        return ModelProbabilities(tuple(self.models), posterior, log_odds)

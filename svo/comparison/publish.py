@@ -1,0 +1,52 @@
+"""From a finished comparison to what people read: two CSV files, a picture, and a few lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from svo.comparison.comparison import Compared
+from svo.comparison.picture import plot_comparison
+from svo.comparison.table import ComparisonRow, comparison_table, write_runs, write_table
+from svo.plant import Plant
+
+
+def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[ComparisonRow]:
+    """Write comparison.csv, runs.csv and comparison.png into a folder; returns the table."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    out.mkdir(parents=True, exist_ok=True)
+    rows = comparison_table(compared)
+    write_table(out / "comparison.csv", rows)
+    write_runs(out / "runs.csv", compared.rows)
+    longest = max(plant.duration(row.fault, row.profile) for row in rows) - plant.fault_time
+    figure = plot_comparison(rows, compared.comparison.rate, plant.Ts, longest)
+    figure.savefig(out / "comparison.png", dpi=130)
+    return rows
+
+
+def to_text(rows: Sequence[ComparisonRow]) -> str:
+    """Median delays to the first alarm / to the right isolation [s], a line a detector and distribution."""
+    scenarios = list(dict.fromkeys((row.fault, row.profile) for row in rows))
+    table: dict[tuple[str, str], dict[tuple[str, str], ComparisonRow]] = {}
+    for row in rows:
+        table.setdefault((row.distribution, row.detector), {})[row.fault, row.profile] = row
+    width = max(len(row.detector) for row in rows)
+    head = f"{'':8}  {'':{width}}  {'false':>6}  {'us':>5}  " + "  ".join(f"{f'{f} {p}':>14}" for f, p in scenarios)
+    lines = ["median seconds to the first alarm / to isolate the right fault; - where half of the runs do not", head]
+    for (distribution, detector), cells in table.items():
+        one = next(iter(cells.values()))
+        cost = sorted(row.microseconds_per_sample for row in cells.values())[len(cells) // 2]
+        times = "  ".join(f"{_cell(cells[scenario]):>14}" for scenario in scenarios)
+        alarms = f"{100 * one.false_alarms.value:.1f}%"
+        lines.append(f"{distribution:8}  {detector:{width}}  {alarms:>6}  {cost:5.0f}  {times}")
+    return "\n".join(lines)
+
+
+def _cell(row: ComparisonRow) -> str:
+    return f"{_seconds(row.detect.median)} / {_seconds(row.isolate.median)}"
+
+
+def _seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
