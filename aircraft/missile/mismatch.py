@@ -15,7 +15,7 @@ import typer
 from numpy.typing import NDArray
 
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
-from aircraft.missile.models import BOUNDS_FILE, OUTPUTS, Embedding, MismatchBounds
+from aircraft.missile.models import BOUNDS_FILE, Embedding, MismatchBounds, schedule_of
 from aircraft.missile.plant import ENDS, FAULTS, STARTS, fault_of
 from aircraft.missile.scenarios import TS, Fault, Flights, Run
 
@@ -31,7 +31,7 @@ def mismatch(run: Run, embedding: Embedding, errors: SensorErrors) -> MismatchBo
     """The largest mismatch in one flight, given what the actuators achieved."""
     rows = slice(round(STARTS / TS), round(ENDS / TS))
     then = slice(rows.start - DELAY, rows.stop - DELAY)
-    blocks = embedding.over(run.flight.y[rows][:, list(OUTPUTS)])
+    blocks = embedding.over(schedule_of(run.flight.y[rows]))
     v, a, u = run.flight.x[then, 3:6], run.flight.acceleration[then], run.flight.achieved[then]
     force = a - blocks["h"] - np.einsum("kij,kj->ki", blocks["G"], u)
     predicted = np.einsum("kij,kj->ki", blocks["A"], v) + TS * (a + blocks["gravity"])

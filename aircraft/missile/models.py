@@ -10,7 +10,8 @@ h being the part of f_aero / m without inputs, and g_b gravity in body axes. d (
 and of the coefficients make of the force, e (3) what errors of rate and attitude and the discretisation make of the
 velocity. Both are bounded as measured (`aircraft.missile.mismatch`). d enters state and output alike.
 
-The last six outputs only carry the schedule: their rows hold whatever the state is.
+Rates, height and attitude are inputs beside the computed ones: they act through the schedule only, and their columns
+of B and D are zero.
 """
 
 from __future__ import annotations
@@ -33,15 +34,13 @@ from svo.model import UncertainModel
 Array = NDArray[np.float64]
 
 BOUNDS_FILE = "bounds.toml"
-# Of the 15 measurements, in the order of the observers' outputs: velocity, acceleration, then rates, z, phi, theta.
-OUTPUTS = (9, 10, 11, 0, 1, 2, 3, 4, 5, 8, 12, 13)
-N_MODELLED = 6
-# The schedule is the output itself, so that these rows hold exactly; a width keeps them from being degenerate.
-SCHEDULE_WIDTH = 1.0
+OUTPUTS = (9, 10, 11, 0, 1, 2)  # of the 15 measurements: velocity, acceleration
+SCHEDULING = (3, 4, 5, 8, 12, 13)  # rates, z, phi, theta; the schedule of a sample is all twelve, in this order
+N_INPUTS = len(INPUTS) + len(SCHEDULING)
 NAMES = {
     "states": ("vbx", "vby", "vbz"),
-    "inputs": INPUTS,
-    "outputs": ("vbx", "vby", "vbz", "abx", "aby", "abz", "p", "q", "r", "z", "phi", "theta"),
+    "inputs": (*INPUTS, "p", "q", "r", "z", "phi", "theta"),
+    "outputs": ("vbx", "vby", "vbz", "abx", "aby", "abz"),
     "disturbances": ("force x", "force y", "force z", "mismatch vbx", "mismatch vby", "mismatch vbz"),
 }
 TYPICAL = np.array([600.0, 0.0, 20.0, 3.0, 0.0, -10.0, 0.0, 0.01, 0.0, -5000.0, 0.0, 0.07])
@@ -82,17 +81,35 @@ def read_bounds() -> Mapping[str, Mapping[str, MismatchBounds]]:
     }
 
 
-def measurement_of(outputs: ArrayLike) -> Array:
-    """Measurements (K, 15) from the observers' outputs (K, 12); what the observers do not use is zero."""
-    given = np.atleast_2d(np.asarray(outputs, dtype=float))
+def schedule_of(y: Array) -> Array:
+    """Schedules (K, 12) from measurements (K, 15)."""
+    return y[:, [*OUTPUTS, *SCHEDULING]]
+
+
+def measurement_of(schedule: ArrayLike) -> Array:
+    """Measurements (K, 15) from schedules (K, 12); what the observers do not use is zero."""
+    given = np.atleast_2d(np.asarray(schedule, dtype=float))
     y = np.zeros((len(given), 15))
-    y[:, list(OUTPUTS)] = given
+    y[:, [*OUTPUTS, *SCHEDULING]] = given
     return y
+
+
+class MeasuredSchedule:
+    """The schedule from each sample's output and input; a missing sensor keeps its last value."""
+
+    def __init__(self) -> None:
+        self._last = np.full(len(OUTPUTS) + len(SCHEDULING), np.nan)
+
+    def with_input(self, y: Array, u: Array) -> Array:
+        """Schedule (12,) of a sample with output y (6,) and input u (10,)."""
+        now = np.concatenate([y, u[len(INPUTS) :]])
+        self._last = np.where(np.isnan(now), self._last, now)
+        return self._last
 
 
 @dataclass(frozen=True)
 class Embedding:
-    """The scheduled matrices that all observers share; the schedule of a sample is its output vector (12,).
+    """The scheduled matrices that all observers share; the schedule of a sample is `schedule_of` its measurement.
 
     Parameters
     ----------
@@ -129,14 +146,14 @@ class Embedding:
         remembered, blocks = self._last[0]
         key = values.tobytes()
         if key != remembered:
-            if values.shape != (len(OUTPUTS),) or not np.isfinite(values).all():
-                raise ValueError(f"schedule is {values}; expected {len(OUTPUTS)} finite numbers, the outputs")
+            if values.shape != TYPICAL.shape or not np.isfinite(values).all():
+                raise ValueError(f"schedule is {values}; expected {TYPICAL.size} finite measurements")
             parts = {name: part[0] for name, part in self.over(values).items()}
-            D, c = np.zeros((len(OUTPUTS), 4)), values.copy()
-            D[3:6], c[:3], c[3:6] = parts["G"], 0.0, parts["h"]
+            D, c = np.zeros((len(OUTPUTS), N_INPUTS)), np.zeros(len(OUTPUTS))
+            D[3:, : len(INPUTS)], c[3:] = parts["G"], parts["h"]
             blocks = {
                 "A": parts["A"],
-                "B": self.Ts * parts["G"],
+                "B": self.Ts * D[3:],
                 "a": self.Ts * (parts["h"] + parts["gravity"]),
                 "D": D,
                 "c": c,
@@ -148,20 +165,23 @@ class Embedding:
         """One block as a function of the schedule."""
         return lambda schedule: self.at(schedule)[name]
 
-    def model(self, errors: SensorErrors, mismatch: MismatchBounds) -> UncertainModel:
-        """The model without faults, for one set of sensor errors and of mismatch bounds."""
+    def model(self, errors: SensorErrors, mismatch: MismatchBounds, shared: bool = True) -> UncertainModel:
+        """The model without faults, for one set of sensor errors and of mismatch bounds.
+
+        ``shared`` is False where a method can't use that d enters velocity and accelerometers alike: the
+        accelerometers' noise then has the width of d added instead.
+        """
         C, F = np.zeros((len(OUTPUTS), 3)), np.zeros((len(OUTPUTS), 6))
-        C[:3], F[3:6, :3] = np.eye(3), np.eye(3)
+        C[:3], F[3:, :3] = np.eye(3), np.eye(3)
         noise = (errors.bias + errors.noise_bound)[list(OUTPUTS)]
-        noise[3:6] += mismatch.output
-        noise[N_MODELLED:] = SCHEDULE_WIDTH
+        noise[3:] += mismatch.output if shared else mismatch.output + mismatch.force
         return UncertainModel(
             self.block("A"),
             self.block("B"),
             C,
             E=np.hstack([self.Ts * np.eye(3), np.eye(3)]),
             D=self.block("D"),
-            F=F,
+            F=F if shared else None,
             a=self.block("a"),
             c=self.block("c"),
             w=np.concatenate([mismatch.force, mismatch.velocity]),

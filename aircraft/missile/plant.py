@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
-from aircraft.missile.models import OUTPUTS, Embedding, read_bounds
+from aircraft.missile.models import OUTPUTS, SCHEDULING, Embedding, MeasuredSchedule, read_bounds, schedule_of
 from aircraft.missile.scenarios import DM, DN, ETA, TS, Fault, Flights, locked, noise_set, thrust_loss
 from polytopes import HPolytope
 from svo.faults import ActuatorFault, SensorFault, Step
@@ -21,7 +22,10 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
-from svo.plant import HEALTHY, Column, Columns, Exhibit, Reference
+from svo.plant import HEALTHY, Column, Columns, Distribution, Exhibit, Reference, StatedFault
+
+if TYPE_CHECKING:
+    from svo.comparison.detector import Detector
 
 Array = NDArray[np.float64]
 
@@ -30,6 +34,8 @@ FAULT_TIME = 30.0
 ABZ = 2  # of the simulator's measurements
 ABZ_OUTPUT = OUTPUTS.index(ABZ)
 ACCELEROMETER_BIAS = 5.0  # m/s^2
+THRUST_LOSS = 0.25
+LOCKED_PITCH, LOCKED_YAW = -0.044, -0.004  # rad, mean deflections at the time of the fault
 LARGEST_LOSS = 0.5  # that the propulsion observer allows
 FAULTS: Mapping[str, str] = MappingProxyType(
     {
@@ -42,14 +48,17 @@ FAULTS: Mapping[str, str] = MappingProxyType(
 PROFILE = "step"
 
 COLUMNS = Columns(
-    inputs=(Column("dl_rad", "rad"), Column("dm_rad", "rad"), Column("dn_rad", "rad"), Column("eta", "-")),
-    outputs=(
-        *(Column(f"{name}_m_s", "m/s") for name in ("vbx", "vby", "vbz")),
-        *(Column(f"{name}_m_s2", "m/s2") for name in ("abx", "aby", "abz")),
+    inputs=(
+        *(Column(f"{name}_rad", "rad") for name in ("dl", "dm", "dn")),
+        Column("eta", "-"),
         *(Column(f"{name}_rad_s", "rad/s") for name in ("p", "q", "r")),
         Column("z_m", "m"),
         Column("phi_rad", "rad"),
         Column("theta_rad", "rad"),
+    ),
+    outputs=(
+        *(Column(f"{name}_m_s", "m/s") for name in ("vbx", "vby", "vbz")),
+        *(Column(f"{name}_m_s2", "m/s2") for name in ("abx", "aby", "abz")),
     ),
     states=tuple(Column(f"true_{name}_m_s", "m/s") for name in ("vbx", "vby", "vbz")),
 )
@@ -68,14 +77,14 @@ class Missile:
     flights : Flights
     horizon : int
         Steps in the observers' windows.
-    distribution : {"uniform", "gaussian"}, optional
+    distribution : {"bounded", "gaussian"}, optional
         Draws every noise set so, with its standard deviation, whatever its own distribution; the observers' bounds
         stay those of the set.
     """
 
     flights: Flights = field(default_factory=Flights)
     horizon: int = 10
-    distribution: Literal["uniform", "gaussian"] | None = None
+    distribution: Distribution | None = None
     name: str = "missile"
     title: str = "Surface-to-air missile: propulsion, locked fins, accelerometer; residuals by redundancy"
     Ts: float = TS
@@ -84,6 +93,7 @@ class Missile:
     noise_sets: tuple[str, ...] = tuple(NOISE_SETS)
     columns: Columns = COLUMNS
     reference: Mapping[tuple[str, str], Reference] = field(default_factory=dict)
+    compared_faults: tuple[tuple[str, str], ...] = tuple((name, PROFILE) for name in FAULTS)
     reference_title: str = "Marzat et al., SysTol 2010, gives no times"
 
     def duration(self, fault: str, profile: str) -> float:
@@ -92,37 +102,71 @@ class Missile:
         return ENDS - STARTS
 
     def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
-        """One run with its true velocity; ``fault`` may be "none". The inputs are computed ones."""
+        """One run with its true velocity; ``fault`` may be "none".
+
+        The inputs are the computed ones, then the measured rates, height and attitude.
+        """
         _check(fault, profile)
         run = self.flights.run(() if fault == HEALTHY else (fault_of(fault),), self._drawn(noise), seed, ENDS)
         rows = slice(round(STARTS / TS), round(ENDS / TS))
         then = slice(rows.start - DELAY, rows.stop - DELAY)
-        y = run.flight.y[rows][:, list(OUTPUTS)]
-        return Log(time=run.time[rows], u=run.flight.computed[then], y=y, x=run.flight.x[then, 3:6], schedule=y)
+        measured = run.flight.y[rows]
+        return Log(
+            time=run.time[rows],
+            u=np.hstack([run.flight.computed[then], measured[:, list(SCHEDULING)]]),
+            y=measured[:, list(OUTPUTS)],
+            x=run.flight.x[then, 3:6],
+            schedule=schedule_of(measured),
+        )
 
-    def models(self, noise: str) -> dict[str, UncertainModel]:
-        """The observers' models: "nominal", then one for each fault, which contains the healthy missile."""
-        errors, bounds = noise_set(noise), read_bounds()[noise]
-        embedding = Embedding(self.flights.airframe, self.Ts)
-        models = {"nominal": embedding.model(errors, bounds["nominal"])}
-        for name in self.faults:
-            models[name] = _observed(name).model(embedding.model(errors, bounds[name]))
-        return models
+    def models(self, noise: str, shared: bool = True) -> dict[str, UncertainModel]:
+        """The observers' models: "nominal", then one for each fault, which contains the healthy missile.
+
+        ``shared`` as `Embedding.model` takes it.
+        """
+        models = {name: self._healthy(noise, name, shared) for name in ("nominal", *self.faults)}
+        return models | {name: _observed(name).model(models[name]) for name in self.faults}
+
+    def stated_faults(self, noise: str, shared: bool = True) -> dict[str, StatedFault]:
+        """The missile with each fault at the size of its flights, the fins locked where they are on average at 30 s."""
+        models = {name: self._healthy(noise, name, shared) for name in self.faults}
+        size = 1.0 - THRUST_LOSS
+        changed = {
+            "propulsion": _with_input(models["propulsion"], ETA, size, 0.0),
+            "pitch_fin": _with_input(models["pitch_fin"], DM, 0.0, LOCKED_PITCH),
+            "yaw_fin": _with_input(models["yaw_fin"], DN, 0.0, LOCKED_YAW),
+            "accelerometer": _with_output(models["accelerometer"], ABZ_OUTPUT, ACCELEROMETER_BIAS),
+        }
+        return {name: StatedFault(FAULTS[name], model) for name, model in changed.items()}
+
+    def _healthy(self, noise: str, observer: str, shared: bool) -> UncertainModel:
+        errors = noise_set(noise)
+        return self._embedding.model(errors, read_bounds()[noise][observer], shared)
+
+    @cached_property
+    def _embedding(self) -> Embedding:
+        return Embedding(self.flights.airframe, self.Ts)
 
     def bank(self, noise: str) -> Bank:
         """A fresh isolation bank of window observers with box templates."""
         observers = {name: WindowObserver(m, INITIAL, horizon=self.horizon) for name, m in self.models(noise).items()}
         return ArchitectureI(observers.pop("nominal"), observers)
 
-    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
-        """A fresh filter: the schedule is the output, with the last value of a sensor that is missing."""
-        last = np.array([np.nan] * len(OUTPUTS))
+    def scheduler(self) -> MeasuredSchedule:
+        """A fresh filter: the schedule is what is measured, with the last value of a sensor that is missing."""
+        return MeasuredSchedule()
 
-        def schedule(y: NDArray[np.float64]) -> NDArray[np.float64]:
-            last[:] = np.where(np.isnan(y), last, y)
-            return last.copy()
+    def with_noise(self, distribution: Distribution) -> Missile:
+        """This missile with bounded or Gaussian noise of the same standard deviation; models and bounds are unchanged."""
+        return replace(self, distribution=distribution)
 
-        return schedule
+    def detectors(self, noise: str) -> list[Detector]:
+        """What ``svo compare missile`` sets side by side; see `aircraft.missile.detectors`."""
+        from aircraft.missile.detectors import detectors
+
+        nominal = self.models(noise, shared=False)["nominal"]
+        stated = {name: fault.model for name, fault in self.stated_faults(noise, shared=False).items()}
+        return detectors(self.models(noise), nominal, stated, INITIAL, self.flights.airframe)
 
     def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> list[Exhibit]:
         """The residuals' part of a study: scenarios of Table II over seeds, written into its folder."""
@@ -131,19 +175,23 @@ class Missile:
 
         study = run_study(runs, seed, noise, self.flights)
         study.write(folder)
-        caption = "A flight with the seed of the study; dashed lines: a fault begins. Tables: scenarios.txt, scenario_*.csv."
+        caption = (
+            "A flight with the seed of the study; dashed lines: a fault begins. Tables: scenarios.txt, scenario_*.csv."
+        )
         pictures = write_figures(folder, self.flights, seed, noise[0])
         return [Exhibit(path, title, caption) for title, path in pictures.items()]
 
     def _drawn(self, noise: str) -> SensorErrors:
         errors = noise_set(noise)
-        return errors if self.distribution is None else replace(errors, distribution=self.distribution)
+        if self.distribution is None:
+            return errors
+        return replace(errors, distribution="uniform" if self.distribution == "bounded" else "gaussian")
 
 
 def fault_of(name: str) -> Fault:
     """The fault that a simulated flight has from `FAULT_TIME` on."""
     if name == "propulsion":
-        return thrust_loss(0.25, FAULT_TIME)
+        return thrust_loss(THRUST_LOSS, FAULT_TIME)
     if name == "pitch_fin":
         return locked(DM, FAULT_TIME)
     if name == "yaw_fin":
@@ -159,6 +207,31 @@ def _observed(name: str) -> ActuatorFault | SensorFault:
     if isinstance(fault, SensorFault):
         return replace(fault, where=ABZ_OUTPUT)
     return replace(fault, magnitude=LARGEST_LOSS) if fault.where == ETA else fault
+
+
+def _with_input(model: UncertainModel, channel: int, gain: float, offset: float) -> UncertainModel:
+    """The model in which an input is achieved as gain u + offset."""
+    factor = np.ones(model.n_inputs)
+    factor[channel] = gain
+
+    def scaled(block: str) -> Callable[[Any], Array]:
+        return lambda schedule: getattr(model, block)(schedule) * factor
+
+    def shifted(offset_block: str, block: str) -> Callable[[Any], Array]:
+        return lambda schedule: (
+            getattr(model, offset_block)(schedule) + getattr(model, block)(schedule)[:, channel] * offset
+        )
+
+    return model.replace(B=scaled("B"), D=scaled("D"), a=shifted("a", "B"), c=shifted("c", "D"))
+
+
+def _with_output(model: UncertainModel, channel: int, offset: float) -> UncertainModel:
+    """The model in which a sensor reads ``offset`` too much."""
+    bias = np.zeros(model.n_outputs)
+    bias[channel] = offset
+    healthy = model.c
+    assert callable(healthy)
+    return model.replace(c=lambda schedule: np.asarray(healthy(schedule)) + bias)
 
 
 def _check(fault: str, profile: str) -> None:

@@ -190,6 +190,12 @@ def residuals(y: ArrayLike, u: ArrayLike, airframe: Airframe, names: Sequence[st
     return ResidualLog(tuple(names), np.einsum("kri,ki->kr", balance.weights(names), imbalance))
 
 
+def moving_mean(values: Array, samples: int) -> Array:
+    """Mean of the last so many rows of (K, R) values; NaN while there are too few, and where one of them is."""
+    padded = np.vstack([np.full((samples - 1, values.shape[1]), np.nan), values])
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, samples, axis=0).mean(axis=-1))
+
+
 def known_residual(name: str) -> Residual:
     """The residual of that name; ValueError if there is none."""
     if name not in RESIDUALS:

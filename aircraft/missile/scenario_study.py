@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from aircraft.missile.adaptive import ModelError
 from aircraft.missile.airframe import INPUTS
 from aircraft.missile.isolability import isolability_table
-from aircraft.missile.redundancy import TABLE_1, residuals, signature_matrix
+from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
 from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scenario, locked, noise_set, thrust_loss
 from aircraft.missile.sequence import isolate_in_order
 
@@ -133,8 +133,7 @@ def run_study(runs: int, seed: int, noises: Sequence[str], flights: Flights | No
 
 def fixed_alarms(time: Array, values: Array) -> Flags:
     """Mean of ten samples further than 5 sigma from its mean, both learnt from 5 to 19 s; (K, R) like ``values``."""
-    padded = np.vstack([np.full((MEAN_SAMPLES - 1, values.shape[1]), np.nan), values])
-    means = np.lib.stride_tricks.sliding_window_view(padded, MEAN_SAMPLES, axis=0).mean(axis=-1)
+    means = moving_mean(values, MEAN_SAMPLES)
     learnt = means[(time >= LEARNT_FROM) & (time < LEARNT_TO)]
     return np.abs(means - learnt.mean(axis=0)) > SIGMAS * learnt.std(axis=0)
 

@@ -78,12 +78,13 @@ def test_set_contains_the_true_velocity_throughout() -> None:
 def test_scheduler_gives_the_logs_schedule_and_holds_missing_values() -> None:
     log = PLANT.simulate("none", "none", "bounded", 0)
     schedule = PLANT.scheduler()
-    np.testing.assert_array_equal([schedule(y) for y in log.y[:20]], log.schedule[:20])
+    seen = [schedule.with_input(y, u) for y, u in zip(log.y[:20], log.u[:20], strict=True)]
+    np.testing.assert_array_equal(seen, log.schedule[:20])
     broken = log.y[20].copy()
     broken[3] = np.nan
-    held = schedule(broken)
+    held = schedule.with_input(broken, log.u[20])
     assert held[3] == log.y[19, 3]
-    assert (np.delete(held, 3) == np.delete(broken, 3)).all()
+    assert (np.delete(held, 3) == np.delete(log.schedule[20], 3)).all()
 
 
 def test_noise_may_be_drawn_otherwise_than_bounded() -> None:
@@ -103,5 +104,5 @@ def test_mistakes_are_named() -> None:
         fault_of("wing")
     with pytest.raises(ValueError, match="noise is 'loud'"):
         PLANT.models("loud")
-    with pytest.raises(ValueError, match="12 finite numbers"):
+    with pytest.raises(ValueError, match="12 finite measurements"):
         Embedding(Airframe(), TS).at(np.zeros(3))
