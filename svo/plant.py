@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -252,6 +253,24 @@ class DetectsThresholds(Protocol):
 
     def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
         """What that detector says about a log; None if there is none after all."""
+        ...
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A picture that a plant adds to its study, and what it shows."""
+
+    path: Path
+    title: str
+    caption: str
+
+
+@runtime_checkable
+class AddsExhibits(Protocol):
+    """What a `Plant` offers besides if its study has more to show than the bank's times to detect and isolate."""
+
+    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
+        """Run the additional part of a study, write tables and pictures into its folder, return the pictures."""
         ...
 
 

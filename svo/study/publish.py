@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from svo.plant import Plant
-from svo.study.figures import write_pictures
+from svo.plant import AddsExhibits, Plant
+from svo.study.figures import Picture, write_pictures
 from svo.study.interactive import interactive_section
 from svo.study.report import write_report
 from svo.study.store import StudyFolder
@@ -16,6 +16,10 @@ def publish(folder: StudyFolder, plant: Plant) -> list[ConditionSummary]:
     summaries = summarise(rows)
     write_summary(folder.path / "summary.csv", summaries)
     pictures = write_pictures(folder.path, plant, summaries, exemplars)
+    if isinstance(plant, AddsExhibits):
+        asked = folder.identity()["configuration"]
+        added = plant.exhibits(folder.path, asked["runs"], asked["seed"], asked["noise"])
+        pictures += [Picture(exhibit.path, exhibit.title, exhibit.caption) for exhibit in added]
     interactive = interactive_section(plant, rows, exemplars)
     write_report(folder.path / "report.html", plant, folder.identity(), summaries, pictures, interactive)
     return summaries
