@@ -202,10 +202,10 @@ def unknown_input_exists(A: ArrayLike, C: ArrayLike, E: ArrayLike, D: ArrayLike 
     modes: NDArray[np.complex128] = np.linalg.eigvals(error).astype(complex)
     for value in modes:
         pencil = np.vstack([value * np.eye(n) - error, seen])
-        if abs(value) >= _STABLE and np.linalg.matrix_rank(pencil, tol=1e-9 * max(1.0, np.linalg.norm(A))) < n:
+        if abs(value) >= _STABLE and np.linalg.matrix_rank(pencil, tol=1e-9 * max(1.0, float(np.linalg.norm(A)))) < n:
             raise ValueError(
-                f"the error has a mode at {_number(value)} that the decoupled outputs do not see; expected all such modes "
-                "inside the unit circle (detectability), so name fewer unknown inputs"
+                f"the error has a mode at {_number(value)} that the decoupled outputs do not see; expected all such "
+                "modes inside the unit circle (detectability), so name fewer unknown inputs"
             )
 
 
