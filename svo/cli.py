@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
     from svo.interval.study import LearnsDetectors
     from svo.log import Log
-    from svo.plant import MonitoredPlant, Plant
+    from svo.plant import MonitoredPlant
     from svo.study.configuration import StudyConfiguration
 
 app = typer.Typer(

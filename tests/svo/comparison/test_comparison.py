@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from small_plant import SmallPlant
+from compared_plant import SmallPlant
 
 from svo.comparison import comparison as module
 from svo.comparison.comparison import Comparison, run_comparison

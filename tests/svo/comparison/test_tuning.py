@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from small_plant import BOX, SmallPlant, model
+from compared_plant import BOX, SmallPlant, model
 
 from svo.comparison.detector import Parameter, Setting
 from svo.comparison.scaled_bounds import scaled_bounds
@@ -24,7 +24,7 @@ class Scaled(ThresholdDetector):
         return log
 
     def scores(self, setting, prepared):
-        late = int(round(20 * abs(setting.parameters.get("place", 0.3) - 0.3)))
+        late = round(20 * abs(setting.parameters.get("place", 0.3) - 0.3))
         return np.concatenate([np.full(late, np.nan), prepared])[: len(prepared)]
 
 
@@ -110,7 +110,7 @@ def test_scaled_bounds(scheduled):
 def test_parameters_are_searched_on_their_scale():
     assert Parameter(1.0, 100.0, logarithmic=True).at(0.5) == pytest.approx(10.0)
     assert Parameter(1, 8, integer=True).at(0.49) == 4.0
-    with pytest.raises(ValueError, match="low is 0.0 on a logarithmic scale"):
+    with pytest.raises(ValueError, match=r"low is 0\.0 on a logarithmic scale"):
         Parameter(0.0, 1.0, logarithmic=True)
     with pytest.raises(ValueError, match="expected finite numbers, low < high"):
         Parameter(1.0, 1.0)
