@@ -39,7 +39,7 @@ def write_report(
     identity: Mapping[str, Any],
     summaries: Sequence[ConditionSummary],
     pictures: Iterable[Picture],
-    interactive: str,
+    interactive: str = "",
 ) -> None:
     """Write the report of a study.
 

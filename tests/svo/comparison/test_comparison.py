@@ -50,6 +50,7 @@ def test_gaussian_noise_falsifies_stated_bounds_and_tuning_widens_them(compared,
     assert compared.tuned["gaussian", "SVO N = 5, scaled bounds"].setting.level > 1.2
 
 
+@pytest.mark.slow
 def test_every_tuned_detector_comes_near_the_rate_and_finds_the_faults(table):
     for row in table[1]:
         if row.detector.endswith("stated bounds"):
