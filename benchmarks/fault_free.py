@@ -66,7 +66,7 @@ def examine(job: Job) -> Outcome:
     plant = _plant()
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     record = plant.bank(job.noise).run(log)
-    healthy_until = len(log) if job.fault == HEALTHY else first_faulty_sample(plant, log)
+    healthy_until = len(log) if job.fault == HEALTHY else first_faulty_sample(plant, job, log)
     false_alarms = tuple(
         f"{name} at sample {died}"
         for name, died in record.died_at.items()

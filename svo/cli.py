@@ -10,12 +10,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from svo.cli_output import describe, print_checks, print_detection, print_isolability, print_json, print_study
+from svo.cli_output import (
+    describe,
+    print_checks,
+    print_detection,
+    print_detector_study,
+    print_isolability,
+    print_json,
+    print_study,
+)
 
 if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
     from svo.log import Log
     from svo.plant import Plant
+    from svo.study.configuration import StudyConfiguration
 
 app = typer.Typer(
     help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
@@ -82,14 +91,17 @@ def study(
 ) -> None:
     """Measure times to detect and to isolate over many simulated runs.
 
-    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html.
+    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html. A plant with
+    interval detectors (elevator) is studied with these, each learnt anew in every run.
 
     \b
     Example:
       svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
+      svo study elevator --runs 200 --seed 0 --out results
     """
     with _one_line_errors():
         _need_study_extra()
+        from svo.interval.study import LearnsDetectors
         from svo.plant import load_plant
         from svo.progress import progress
         from svo.study.configuration import StudyConfiguration
@@ -102,6 +114,9 @@ def study(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or ()
         )
         StudyFolder(out).check(configuration, resume)
+        if isinstance(the_plant, LearnsDetectors):
+            _study_detectors(the_plant, configuration, out, workers, resume, as_json)
+            return
         _announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
         with progress("Runs") as update:
@@ -136,7 +151,7 @@ def simulate(
     """
     with _one_line_errors():
         from svo.log_file import write_log
-        from svo.plant import HEALTHY, load_plant
+        from svo.plant import HEALTHY, fault_start, load_plant
         from svo.study.configuration import check_fault, check_noise
 
         the_plant = load_plant(plant)
@@ -153,7 +168,8 @@ def simulate(
             profile = profile or the_plant.faults[fault][0]
         log = the_plant.simulate(fault, profile, noise, seed)
         write_log(out, log, the_plant.columns)
-        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {the_plant.fault_time:g} s"
+        start = fault_start(the_plant, fault, profile)
+        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {start:g} s"
         typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
 
 
@@ -369,6 +385,23 @@ def _one_line_errors() -> Iterator[None]:
 def _fail(message: str, code: int = 1) -> None:
     typer.echo(f"error: {' '.join(message.split())}", err=True)
     raise typer.Exit(code)
+
+
+def _study_detectors(
+    the_plant: Plant, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
+) -> None:
+    from svo.interval.study import publish, run_detection_study
+    from svo.progress import progress
+
+    with progress("Runs") as update:
+        folder = run_detection_study(configuration, out, workers=workers, resume=resume, progress=update)
+    _announce("Writing summary, pictures and report")
+    found = publish(folder, the_plant)
+    if as_json:
+        print_json({"configuration": configuration.to_dict(), **found.to_dict()})
+        return
+    print_detector_study(found)
+    typer.echo(f"Report: {out / 'report.html'}")
 
 
 def _need_study_extra() -> None:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from svo.alarms import AlarmCheck
     from svo.detect import Detection
+    from svo.interval.study.publish import DetectionStudy
     from svo.isolability import Isolability
     from svo.plant import Plant
     from svo.study.summary import ConditionSummary
@@ -66,6 +67,17 @@ def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
         typer.echo("")
     if plant.reference:
         typer.echo(f"Paper: {plant.reference_title}; a dash where it says nothing.")
+
+
+def print_detector_study(found: DetectionStudy) -> None:
+    """Tables of a study of interval detectors, and what came out."""
+    from svo.study.tables import to_rich
+
+    screen = console()
+    for table in found.tables:
+        screen.print(to_rich(table))
+    for line in found.findings:
+        typer.echo(f"{line[0].upper()}{line[1:]}.")
 
 
 def print_detection(found: Detection) -> None:

@@ -15,9 +15,7 @@ from svo.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
-from svo.plant import Plant
-
-Scheduler = Callable[[NDArray[np.float64]], Any]
+from svo.plant import Plant, Scheduler, schedule_of
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterat
     the next verdict is asked for.
     """
     for k in range(len(log)):
-        schedule = log.schedule_at(k) if scheduler is None else scheduler(log.y[k])
+        schedule = log.schedule_at(k) if scheduler is None else schedule_of(scheduler, log.y[k], log.u[k])
         if k == 0:
             yield bank.update(log.y[0], u=log.u[0], schedule=schedule)
         else:
@@ -110,7 +108,7 @@ def detect(
     ----------
     plant : Plant
     log : Log
-        Only time, u and y are used; the plant's own scheduler makes the schedule from y.
+        Only time, u and y are used; the plant's own scheduler makes the schedule of them.
     noise : str
         Noise set whose bounds the observers assume.
     source : mapping, optional

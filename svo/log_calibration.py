@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from polytopes import HPolytope
 from svo.calibration import Calibration, calibrate
 from svo.log import Log
-from svo.plant import Plant
+from svo.plant import Plant, schedule_of
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class LogCalibration:
 def calibrate_log(plant: Plant, log: Log, noise: str) -> LogCalibration:
     """Calibrate the model of a bank's nominal observer; the plant's own scheduler makes the schedule from y."""
     nominal, scheduler = plant.bank(noise).observers["nominal"], plant.scheduler()
-    values = [scheduler(y) for y in log.y]
+    values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
     schedule = None if values[0] is None else np.array(values, dtype=float)
     scheduled = Log(time=log.time, u=log.u, y=log.y, schedule=schedule)
     # Nothing measured yet, so this is the set that the observer starts from.

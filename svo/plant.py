@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -24,6 +25,23 @@ if TYPE_CHECKING:
 
 HEALTHY = "none"
 Distribution = Literal["bounded", "gaussian"]
+
+
+@runtime_checkable
+class InputScheduler(Protocol):
+    """A causal scheduling filter that needs the input of each sample beside its measurement."""
+
+    def with_input(self, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
+        """The schedule of a sample from its y (ny,) and u (nu,); called with each sample in turn."""
+        ...
+
+
+Scheduler = Callable[[NDArray[np.float64]], Any] | InputScheduler
+
+
+def schedule_of(scheduler: Scheduler, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
+    """The schedule of the next sample, by a filter of either kind."""
+    return scheduler.with_input(y, u) if isinstance(scheduler, InputScheduler) else scheduler(y)
 
 
 @dataclass(frozen=True)
@@ -98,7 +116,7 @@ class Plant(Protocol):
         """A fresh isolation bank; its fault observers are named as in `faults`."""
         ...
 
-    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+    def scheduler(self) -> Scheduler:
         """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
         ...
 
@@ -126,6 +144,40 @@ class StatesFaults(Protocol):
     def stated_faults(self, noise: str) -> Mapping[str, StatedFault]:
         """Each fault at the size of its first profile, with the bounds of a noise set."""
         ...
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A picture that a plant adds to its study, and what it shows."""
+
+    path: Path
+    title: str
+    caption: str
+
+
+@runtime_checkable
+class AddsExhibits(Protocol):
+    """What a `Plant` offers besides if its study has more to show than the bank's times to detect and isolate."""
+
+    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
+        """Run the additional part of a study, write tables and pictures into its folder, return the pictures."""
+        ...
+
+
+@runtime_checkable
+class TimesFaults(Protocol):
+    """What a `Plant` offers besides if its faults do not all begin at `fault_time`."""
+
+    def fault_start(self, fault: str, profile: str) -> float:
+        """Time of the first faulty sample of a fault and profile [s]."""
+        ...
+
+
+def fault_start(plant: Plant, fault: str, profile: str) -> float:
+    """Time of the first faulty sample of a fault and profile [s]; the plant's `fault_time` without a fault."""
+    if fault != HEALTHY and isinstance(plant, TimesFaults):
+        return plant.fault_start(fault, profile)
+    return plant.fault_time
 
 
 @runtime_checkable

@@ -10,7 +10,7 @@ import numpy as np
 from svo.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms
 from svo.log import Log
 from svo.observers.chain import chain_of
-from svo.plant import Plant
+from svo.plant import Plant, schedule_of
 
 
 def verify_chains(path: str | Path, log: Log, plant: Plant) -> list[AlarmCheck]:
@@ -31,7 +31,7 @@ def verify_chains(path: str | Path, log: Log, plant: Plant) -> list[AlarmCheck]:
     if not all(check.ok for check in checks):
         return checks
     scheduler = plant.scheduler()
-    values = [scheduler(y) for y in log.y]
+    values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
     known = replace(log, schedule=None if values[0] is None else np.array(values, dtype=float))
     return [_with_chain(check, alarm, known, plant) for check, alarm in zip(checks, read_alarms(path), strict=True)]
 

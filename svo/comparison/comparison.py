@@ -14,7 +14,7 @@ from svo.comparison.detector import Detector, Kind
 from svo.comparison.run import ComparedRun, Condition, compare_run
 from svo.comparison.tuning import FaultyRun, Tuned, tune
 from svo.log import Log
-from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, load_plant
+from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, load_plant
 
 Progress = Callable[[int, int], None]
 DISTRIBUTIONS: tuple[Distribution, ...] = ("bounded", "gaussian")
@@ -128,7 +128,7 @@ def compare_detector(comparison: Comparison, distribution: Distribution, index: 
     rows = []
     _compile(detector, tuned, plant.simulate(*scenarios[1], comparison.noise, 0))
     for scenario, ((fault, profile), count) in enumerate(zip(scenarios, counts, strict=True)):
-        condition = Condition(distribution, fault, profile, plant.fault_time)
+        condition = Condition(distribution, fault, profile, fault_start(plant, fault, profile))
         for seed in comparison.seeds(_JUDGING, scenario, count):
             log = plant.simulate(fault, profile, comparison.noise, seed)
             rows.append(compare_run(detector, tuned.setting, log, condition, seed))
@@ -146,17 +146,14 @@ def _tune(comparison: Comparison, plant: Plant, detector: Detector, scenarios: S
             if fault == HEALTHY:
                 healthy.append(detector.prepare(log))
             else:
-                faulty.append(FaultyRun(f"{fault} {profile}", detector.prepare(log), _first_faulty(plant, log)))
+                first = round((fault_start(plant, fault, profile) - float(log.time[0])) / plant.Ts)
+                faulty.append(FaultyRun(f"{fault} {profile}", detector.prepare(log), first))
     return tune(detector, healthy, faulty, comparison.rate, comparison.evaluations)
 
 
 def _compile(detector: Detector, tuned: Tuned, log: Log) -> None:
     """Run once untimed, so that no judged run pays for compilation."""
     detector.run(tuned.setting, detector.prepare(log))
-
-
-def _first_faulty(plant: Plant, log: Log) -> int:
-    return round((plant.fault_time - float(log.time[0])) / plant.Ts)
 
 
 def _results(

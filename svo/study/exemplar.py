@@ -16,7 +16,7 @@ from polytopes import HPolytope
 from svo.detect import verdicts
 from svo.log import Log
 from svo.observers.step import Step
-from svo.plant import Plant
+from svo.plant import Plant, fault_start
 from svo.study.configuration import Job
 
 Array = NDArray[np.float64]
@@ -134,13 +134,14 @@ def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
     snapshots: list[Snapshot] = []
     sets: dict[str, HPolytope] = {}
     living: tuple[str, ...] = names
+    begins = fault_start(plant, job.fault, job.profile)
     for k, verdict in enumerate(verdicts(bank, log)):
         fallen = [name for name in living if name not in verdict.alive]
         if fallen and sets:
             snapshots.append(Snapshot(k - 1, f"{', '.join(fallen)} falsified next", sets))
         living = verdict.alive
         steps = {name: verdict.steps[name] for name in living if name in verdict.steps}  # class II waits
-        shown = log.time[k] >= plant.fault_time - plant.Ts and len(living) > 1  # what a snapshot may keep
+        shown = log.time[k] >= begins - plant.Ts and len(living) > 1  # what a snapshot may keep
         sets = {name: planar_outline(step) if shown else step.set for name, step in steps.items()}
         alive[k] = [name in living for name in names]
         for name, step in steps.items():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from svo.plant import HEALTHY, Plant
+from svo.plant import HEALTHY, Plant, fault_start
 from svo.study import plots
 from svo.study.exemplar import Exemplar
 from svo.study.summary import ConditionSummary
@@ -108,7 +108,7 @@ def _alive(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
     for row, fault in zip(axes, faults, strict=True):
         chosen = [e for e in exemplars if e.fault == fault]
         for ax, exemplar in zip(row, chosen, strict=False):
-            plots.plot_alive(exemplar, plant.fault_time, plant.Ts, ax)
+            plots.plot_alive(exemplar, _start(plant, exemplar), plant.Ts, ax)
             ax.set_title(f"{exemplar.fault}, {exemplar.profile}")
             if ax is not row[0]:
                 ax.set_yticklabels([])
@@ -131,7 +131,7 @@ def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
         dims = plots.separating_states(exemplar)
         for ax, snapshot in zip(row, snapshots, strict=False):
             plots.plot_sets(exemplar, snapshot, dims, plant.columns.states, ax)
-            after = exemplar.time[snapshot.sample] - plant.fault_time
+            after = exemplar.time[snapshot.sample] - _start(plant, exemplar)
             ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {after:+.2f} s\n{snapshot.event}", fontsize=9.5)
             ax.xaxis.set_major_locator(MaxNLocator(4))
             ax.yaxis.set_major_locator(MaxNLocator(5))
@@ -146,10 +146,10 @@ def _bounds(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
     figure = _figure(4.6 * columns, 2.2 * len(exemplars) + 0.4)
     axes = figure.subplots(len(exemplars), columns, squeeze=False)
     for row, exemplar in zip(axes, exemplars, strict=True):
-        window = plots.time_window(exemplar, plant.fault_time, plant.Ts)
+        window = plots.time_window(exemplar, _start(plant, exemplar), plant.Ts)
         for ax, state in zip(row, plots.separating_states(exemplar), strict=True):
-            plots.plot_bounds(exemplar, state, plant.columns.states, plant.fault_time, ax)
-            plots.zoom(ax, exemplar, state, plant.fault_time, window)
+            plots.plot_bounds(exemplar, state, plant.columns.states, _start(plant, exemplar), ax)
+            plots.zoom(ax, exemplar, state, _start(plant, exemplar), window)
         row[0].set_title(f"{exemplar.fault}, {exemplar.profile}")
     for ax in axes[:-1].ravel():
         ax.set_xlabel("")
@@ -188,3 +188,7 @@ def _figure(width: float, height: float) -> Figure:
 def _save(path: Path, figure: Figure, title: str, caption: str) -> Picture:
     figure.savefig(path, dpi=DPI)
     return Picture(path, title, caption)
+
+
+def _start(plant: Plant, exemplar: Exemplar) -> float:
+    return fault_start(plant, exemplar.fault, exemplar.profile)

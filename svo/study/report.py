@@ -59,12 +59,12 @@ def write_report(
         f'<p class="soft">{escape(_subtitle(summaries, configuration))}</p>',
         "<h2>What came out</h2>",
         _findings(summaries),
-        *(_html_table(tables.delay_table(plant, group)) for group in _by_noise(summaries)),
+        *(html_table(tables.delay_table(plant, group)) for group in _by_noise(summaries)),
         f'<p class="soft">Paper: {escape(plant.reference_title)}; a dash where it says nothing.</p>'
         if plant.reference
         else "",
         "<h2>Pictures</h2>",
-        *(_figure(picture) for picture in pictures),
+        *(html_figure(picture) for picture in pictures),
         "<h2>What is counted</h2>",
         "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in _GLOSSARY.items()) + "</dl>",
         "<h2>How to make it again</h2>",
@@ -72,11 +72,16 @@ def write_report(
         "<p>The table of runs is in <code>runs.parquet</code>, the statistics in <code>summary.csv</code>, every alarm "
         "with its certificate in <code>alarms.jsonl</code> (<code>svo verify</code> checks them). "
         "<code>svo simulate</code> with a run's seed makes that run's log.</p>",
-        _facts("Configuration", configuration),
-        _facts("Versions", identity["versions"]),
+        html_facts("Configuration", configuration),
+        html_facts("Versions", identity["versions"]),
     ]
+    write_page(path, f"Isolation-time study: {plant.title}", parts)
+
+
+def write_page(path: Path, title: str, parts: Iterable[str]) -> None:
+    """Write pieces of HTML as one page with the reports' style inside."""
     style = files("svo.study").joinpath("report.css").read_text(encoding="utf-8")
-    path.write_text(_PAGE.format(title=escape(plant.title), style=style, body="\n".join(parts)), encoding="utf-8")
+    path.write_text(_PAGE.format(title=escape(title), style=style, body="\n".join(parts)), encoding="utf-8")
 
 
 _PAGE = """<!doctype html>
@@ -84,7 +89,7 @@ _PAGE = """<!doctype html>
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Isolation-time study: {title}</title>
+<title>{title}</title>
 <style>
 {style}</style>
 </head>
@@ -112,7 +117,8 @@ def _by_noise(summaries: Sequence[ConditionSummary]) -> list[list[ConditionSumma
     return [[s for s in summaries if s.noise == noise] for noise in names]
 
 
-def _html_table(table: tables.TextTable) -> str:
+def html_table(table: tables.TextTable) -> str:
+    """A table with its caption."""
     head = "".join(
         f'<th scope="col"{_label(i, table)}>{escape(name).replace(chr(10), "<br>")}</th>'
         for i, name in enumerate(table.header)
@@ -136,7 +142,8 @@ def _label(i: int, table: tables.TextTable) -> str:
     return ' class="label"' if i < table.labels else ""
 
 
-def _figure(picture: Picture) -> str:
+def html_figure(picture: Picture) -> str:
+    """A picture inside the page, with its caption."""
     data = base64.b64encode(picture.path.read_bytes()).decode("ascii")
     return (
         f'<figure><img src="data:image/png;base64,{data}" alt="{escape(picture.title)}">'
@@ -144,7 +151,8 @@ def _figure(picture: Picture) -> str:
     )
 
 
-def _facts(title: str, facts: Mapping[str, Any]) -> str:
+def html_facts(title: str, facts: Mapping[str, Any]) -> str:
+    """Names and values, such as a configuration."""
     rows = "".join(
         f"<tr><th scope='row'>{escape(str(key))}</th><td>{escape(_text(value))}</td></tr>"
         for key, value in facts.items()

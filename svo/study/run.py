@@ -10,7 +10,7 @@ from svo.alarms import Alarm
 from svo.detect import alarms_of
 from svo.isolation.record import BankRecord
 from svo.log import Log
-from svo.plant import HEALTHY, Plant
+from svo.plant import HEALTHY, Plant, fault_start
 from svo.study.configuration import Job
 from svo.study.exemplar import Exemplar, follow
 
@@ -81,7 +81,7 @@ def execute(plant: Plant, job: Job) -> RunOutcome:
 def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
     """The row of a run, from the record of its bank."""
     healthy = job.fault == HEALTHY
-    first_faulty = len(log) if healthy else first_faulty_sample(plant, log)
+    first_faulty = len(log) if healthy else first_faulty_sample(plant, job, log)
     detected, isolated = record.detected_at, record.isolated_at
     false_alarm = detected is not None and detected < first_faulty
     isolated_as = record.fault if isolated is not None else None
@@ -119,9 +119,9 @@ def source_of(plant: Plant, job: Job) -> dict[str, str | int | float]:
     }
 
 
-def first_faulty_sample(plant: Plant, log: Log) -> int:
-    """Index of the first sample at which the fault acts."""
-    return round((plant.fault_time - float(log.time[0])) / plant.Ts)
+def first_faulty_sample(plant: Plant, job: Job, log: Log) -> int:
+    """Index of the first sample at which the job's fault acts."""
+    return round((fault_start(plant, job.fault, job.profile) - float(log.time[0])) / plant.Ts)
 
 
 def _delay(plant: Plant, sample: int | None, first_faulty: int) -> float | None:

@@ -21,6 +21,7 @@ NAMES = {
     "svo.plant": ["Plant"],
     "svo.faults": ["ActuatorFault", "Exponential", "Intermittent", "PlantFault", "Ramp", "SensorFault", "Step"],
     "svo.indices": ["detection_indices"],
+    "svo.interval": ["IntervalDetector", "IntervalPredictor", "NoiseCharacterization"],
 }
 
 ARGUMENTS = [
@@ -64,7 +65,7 @@ def test_the_set_has_the_operation(name: str) -> None:
 
 
 def test_every_public_name_exists() -> None:
-    for module in ("svo", "svo.faults", "polytopes"):
+    for module in ("svo", "svo.faults", "svo.interval", "polytopes"):
         loaded = importlib.import_module(module)
         assert loaded.__all__ == sorted(loaded.__all__)
         assert all(hasattr(loaded, name) for name in loaded.__all__)

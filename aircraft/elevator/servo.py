@@ -1,0 +1,160 @@
+"""Nonlinear servo-loop of an elevator: compiled dynamics and runs (paper 001, equations (1) and (2), corrected).
+
+    dx/dt = gamma(u, x) (u - x)
+    gamma = k sqrt((1 - F sign(u - x)) / (1 + Ka (k (u - x))^2)),   k = Kci K
+
+Everything is normalised by S dPref. The paper prints the force F without a sign; it must oppose the motion one way and
+assist it the other. No values are public: those here are plausible, and no aircraft's.
+
+All compiled functions stand in this one file and take their constants as arguments: a cached machine code does not
+notice a change in another file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from svo.faults import ActuatorLaw
+
+Array = NDArray[np.float64]
+
+SUBSTEPS = 10
+
+
+@dataclass(frozen=True)
+class Servo:
+    """Constants of the servo-loop; angles in radians, forces as fractions of S dPref.
+
+    Attributes
+    ----------
+    gain : float
+        Kci K [1/s].
+    damping : float
+        Ka / (S dPref) [s^2/rad^2].
+    force, force_slope : float
+        Aerodynamic force at zero deflection, and its change per radian.
+    force_swing, force_period : float
+        Relative amplitude and period [s] of its slow change.
+    stop : float
+        Mechanical end stops at +-stop.
+    """
+
+    gain: float = 15.0
+    damping: float = 0.8
+    force: float = 0.10
+    force_slope: float = 0.9
+    force_swing: float = 0.15
+    force_period: float = 70.0
+    stop: float = float(np.radians(30.0))
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(astuple(self)).all():
+            raise ValueError(f"servo is {self}; expected finite numbers")
+        for name in ("gain", "force_period", "stop"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected a number > 0")
+        if self.damping < 0:
+            raise ValueError(f"damping is {self.damping}; expected a number >= 0")
+        largest = (abs(self.force) + abs(self.force_slope) * self.stop) * (1 + abs(self.force_swing))
+        if largest >= 1:
+            raise ValueError(
+                f"the force reaches {largest:g} of the pressure's; expected less than 1, or the servo stalls"
+            )
+
+    def unloaded_rate(self, distance: ArrayLike) -> Array:
+        """gamma [1/s] without force, for a distance u - x; what a predictor can know (19)."""
+        move = self.gain * np.asarray(distance, dtype=float)
+        return self.gain / np.sqrt(1.0 + self.damping * move * move)
+
+    def rate(self, u: float, x: float, t: float) -> float:
+        """gamma [1/s] with the force at time t [s]."""
+        return float(_rate(float(u), float(x), float(t), self._packed()))
+
+    def run(
+        self,
+        u: ArrayLike,
+        x0: float,
+        Ts: float,
+        command: ActuatorLaw | None = None,
+        surface: ActuatorLaw | None = None,
+    ) -> Array:
+        """Positions at each sample, (K,), the input held over each.
+
+        Parameters
+        ----------
+        u : (K,) array
+            Commands [rad].
+        x0 : float
+            Position at the first sample, within the stops.
+        Ts : float
+            Sampling time [s].
+        command, surface : ActuatorLaw, optional
+            What a fault makes of the command that the loop follows, and of the position that the surface takes; one
+            row a sample.
+
+        Raises
+        ------
+        ValueError
+            For commands that are not finite, a start beyond the stops, or laws of another length.
+        """
+        commands = np.ascontiguousarray(u, dtype=float)
+        if commands.ndim != 1 or not np.isfinite(commands).all():
+            raise ValueError(f"u has shape {commands.shape}; expected (K,) finite commands in radians")
+        if not abs(x0) <= self.stop:
+            raise ValueError(f"x0 is {x0}; expected a position within the stops, +-{self.stop:.4g} rad")
+        followed, taken = _rows("command", command, commands.size), _rows("surface", surface, commands.size)
+        x = np.empty(commands.size)
+        x[:1] = x0
+        _run(x, commands, followed, taken, Ts, self._packed())
+        return x
+
+    def _packed(self) -> Array:
+        return np.array(astuple(self))
+
+
+def _rows(name: str, law: ActuatorLaw | None, samples: int) -> Array:
+    """gain, hold, offset, lower, upper, one row a sample."""
+    if law is None:
+        return np.tile([1.0, 0.0, 0.0, -np.inf, np.inf], (samples, 1))
+    rows = np.column_stack([law.gain, law.hold, law.offset, law.lower, law.upper])
+    if len(rows) != samples:
+        raise ValueError(f"{name} has {len(rows)} rows; expected {samples}, one a sample of u")
+    return np.ascontiguousarray(rows)
+
+
+@njit(cache=True)
+def _rate(u, x, t, p):  # type: ignore[no-untyped-def]
+    gain, damping, force, slope, swing, period = p[0], p[1], p[2], p[3], p[4], p[5]
+    load = (force + slope * x) * (1.0 + swing * np.sin(2.0 * np.pi * t / period))
+    move = gain * (u - x)
+    return gain * np.sqrt((1.0 - load * np.sign(u - x)) / (1.0 + damping * move * move))
+
+
+@njit(cache=True)
+def _law(row, value, held):  # type: ignore[no-untyped-def]
+    return min(max(row[0] * value + row[1] * held + row[2], row[3]), row[4])
+
+
+@njit(cache=True)
+def _run(x, u, command, surface, Ts, p):  # type: ignore[no-untyped-def]
+    """Fill x from its first entry. Over a substep gamma is held, so that the loop cannot overshoot its command."""
+    h, stop = Ts / SUBSTEPS, p[6]
+    held_command, held_position = u[0], x[0]
+    for k in range(x.size):
+        if k > 0:
+            free = x[k - 1]
+            target = _law(command[k - 1], u[k - 1], held_command)
+            for i in range(SUBSTEPS):
+                gamma = _rate(target, free, ((k - 1) + i / SUBSTEPS) * Ts, p)
+                free += (1.0 - np.exp(-gamma * h)) * (target - free)
+                free = min(max(free, -stop), stop)
+            x[k] = free
+        if surface[k, 1] == 0.0:
+            held_position = x[k]
+        if command[k, 1] == 0.0:
+            held_command = u[k]
+        x[k] = min(max(_law(surface[k], x[k], held_position), -stop), stop)

@@ -1,0 +1,268 @@
+"""The scenarios of Table II over many seeds: delays of the residuals, false alarms, isolation by order in time.
+
+Run ``python -m aircraft.missile.scenario_study --runs 100 --out DIR``; ``svo study missile`` includes it. Delays are
+counted from the first faulty sample, which itself counts as one sampling time, to the RECEPTION of the measurement
+that gives the alarm: the two samples of the IMU's delay are in them.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from aircraft.missile.adaptive import ModelError
+from aircraft.missile.airframe import INPUTS
+from aircraft.missile.isolability import isolability_table
+from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
+from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scenario, locked, noise_set, thrust_loss
+from aircraft.missile.sequence import isolate_in_order
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+MEAN_SAMPLES = 10
+SIGMAS = 5.0
+LEARNT_FROM, LEARNT_TO = 5.0, 19.0  # s, before any fault
+NEAR_INTERCEPT = 63.0  # s, from which on the geometry changes fast
+RULES = ("fixed", "adaptive")
+HEALTHY = "healthy"
+MAGNITUDES: dict[str, Scenario] = {
+    **{
+        f"eta -{100 * part:g} %": Scenario((thrust_loss(part, 30.0),), ("r14",))
+        for part in (0.05, 0.1, 0.25, 0.5, 0.75)
+    },
+    "dm locked at 30 s": Scenario((locked(DM, 30.0),), ("r32",)),
+    "dm locked at 50 s": Scenario((locked(DM, 50.0),), ("r32",)),
+    "dn locked at 30 s": Scenario((locked(DN, 30.0),), ("r23",)),
+    "dn locked at 50 s": Scenario((locked(DN, 50.0),), ("r23",)),
+}
+
+
+@dataclass(frozen=True)
+class ResidualRow:
+    """One residual of one flight under one decision rule.
+
+    Attributes
+    ----------
+    scenario, noise, residual, rule : str
+    seed : int
+        Place of the flight among those of the study.
+    event_s : float or None
+        Time of the first fault that the residual depends on; None if it depends on none.
+    delay_s : float or None
+        To the first alarm from the event on; None if there is none.
+    false_alarms, late_false_alarms : int
+        Samples in alarm before that event, before `NEAR_INTERCEPT` and after it.
+    """
+
+    scenario: str
+    noise: str
+    seed: int
+    residual: str
+    rule: str
+    event_s: float | None
+    delay_s: float | None
+    false_alarms: int
+    late_false_alarms: int
+
+
+@dataclass(frozen=True)
+class OrderRow:
+    """Isolation by order in time in one flight: inputs and delays in their order, separated by spaces."""
+
+    scenario: str
+    noise: str
+    seed: int
+    true_order: str
+    found_order: str
+    wrong: bool
+    isolation_delays_s: str
+    sizes_contain_truth: bool
+
+
+@dataclass(frozen=True)
+class ScenarioStudy:
+    """All rows of a study."""
+
+    residuals: tuple[ResidualRow, ...]
+    orders: tuple[OrderRow, ...]
+
+    def to_text(self) -> str:
+        """Tables for people."""
+        return "\n\n".join([_delay_text(self.residuals), _order_text(self.orders), signature_text(Flights())])
+
+    def write(self, folder: Path) -> None:
+        """scenario_residuals.csv, scenario_orders.csv and scenarios.txt."""
+        for name, rows in (("residuals", self.residuals), ("orders", self.orders)):
+            with (folder / f"scenario_{name}.csv").open("w", newline="", encoding="utf-8") as file:
+                writer = csv.DictWriter(file, [f.name for f in fields(rows[0])], lineterminator="\n")
+                writer.writeheader()
+                writer.writerows(asdict(row) for row in rows)
+        (folder / "scenarios.txt").write_text(self.to_text() + "\n", encoding="utf-8")
+
+
+def run_study(runs: int, seed: int, noises: Sequence[str], flights: Flights | None = None) -> ScenarioStudy:
+    """Fly every scenario, every magnitude, and without a fault, ``runs`` times with each noise set.
+
+    Raises
+    ------
+    ValueError
+        If ``runs`` is below one or a noise set is not known.
+    """
+    if runs < 1:
+        raise ValueError(f"runs is {runs}; expected at least 1")
+    simulator = Flights() if flights is None else flights
+    cases = {HEALTHY: Scenario((), TABLE_1)} | {f"scenario {i}": s for i, s in SCENARIOS.items()} | MAGNITUDES
+    rows: list[ResidualRow] = []
+    orders: list[OrderRow] = []
+    for noise in noises:
+        for i, child in enumerate(np.random.SeedSequence(seed).spawn(runs)):
+            for name, scenario in cases.items():
+                run = simulator.run(scenario.faults, noise_set(noise), child)
+                rows += _residual_rows(simulator, run, scenario, name, noise, i)
+                orders.append(_order_row(simulator, run, scenario, name, noise, i))
+    return ScenarioStudy(tuple(rows), tuple(orders))
+
+
+def fixed_alarms(time: Array, values: Array) -> Flags:
+    """Mean of ten samples further than 5 sigma from its mean, both learnt from 5 to 19 s; (K, R) like ``values``."""
+    means = moving_mean(values, MEAN_SAMPLES)
+    learnt = means[(time >= LEARNT_FROM) & (time < LEARNT_TO)]
+    return np.abs(means - learnt.mean(axis=0)) > SIGMAS * learnt.std(axis=0)
+
+
+def adaptive_alarms(simulator: Flights, run: Run, values: Array, names: Sequence[str]) -> Flags:
+    """Residuals beyond what measurement and model errors can do (section III-C), sample by sample."""
+    error = ModelError(run.errors, simulator.model_error)
+    return np.abs(values) > error.residual_bounds(run.flight.y, simulator.airframe, names)
+
+
+def signature_text(simulator: Flights) -> str:
+    """Signature matrix and isolability table, computed from the residuals."""
+    signature = signature_matrix(simulator.airframe)
+    lines = ["signatures" + " " * 8 + "  ".join(f"{name:>3}" for name in INPUTS)]
+    lines += [
+        f"{name:<16}" + "  ".join(f"{int(on):>3}" for on in row) for name, row in zip(TABLE_1, signature, strict=True)
+    ]
+    return "\n".join(lines) + "\n\n" + isolability_table(signature, TABLE_1).to_text()
+
+
+def _residual_rows(
+    simulator: Flights, run: Run, scenario: Scenario, name: str, noise: str, seed: int
+) -> Iterator[ResidualRow]:
+    log = residuals(run.flight.y, run.aligned_inputs, simulator.airframe, scenario.shown)
+    supports = signature_matrix(simulator.airframe, scenario.shown)
+    alarms = {
+        "fixed": fixed_alarms(run.time, log.values),
+        "adaptive": adaptive_alarms(simulator, run, log.values, scenario.shown),
+    }
+    for r, residual in enumerate(scenario.shown):
+        relevant = [time for time, fault in scenario.events if supports[r, INPUTS.index(fault)]]
+        event = min(relevant, default=None)
+        first = len(run.time) if event is None else round(event / TS)
+        for rule in RULES:
+            flags = alarms[rule][:, r]
+            hits = np.flatnonzero(flags[first:])
+            late = run.time[:first] >= NEAR_INTERCEPT
+            yield ResidualRow(
+                name,
+                noise,
+                seed,
+                residual,
+                rule,
+                event,
+                round((int(hits[0]) + 1) * TS, 9) if hits.size else None,
+                int(flags[:first][~late].sum()),
+                int(flags[:first][late].sum()),
+            )
+
+
+def _order_row(simulator: Flights, run: Run, scenario: Scenario, name: str, noise: str, seed: int) -> OrderRow:
+    error = ModelError(run.errors, simulator.model_error)
+    found = isolate_in_order(run.flight.y, run.aligned_inputs, simulator.airframe, error)
+    times = {fault: time for time, fault in scenario.events}
+    delays, contained = [], True
+    for fault in found.faults:
+        first = round(times.get(fault.input, np.inf) / TS) if fault.input in times else None
+        if first is None:
+            continue
+        delays.append(f"{(fault.isolated - first + 1) * TS:.2f}")
+        j = INPUTS.index(fault.input)
+        computed, achieved = (a[fault.isolated, j] for a in (run.flight.computed, run.flight.achieved))
+        size = achieved if fault.kind == "locking" else achieved / computed
+        contained = contained and fault.lower <= size <= fault.upper
+    true_order = tuple(fault for _, fault in scenario.events)
+    wrong = found.order != true_order[: len(found.order)]
+    return OrderRow(name, noise, seed, " ".join(true_order), " ".join(found.order), wrong, " ".join(delays), contained)
+
+
+def _delay_text(rows: Sequence[ResidualRow]) -> str:
+    lines = [
+        "delay [s]: median (min to max) over the flights with an alarm; false: flights with an alarm before the fault",
+        f"{'case':<19}{'noise':<10}{'residual':<10}{'rule':<10}{'reached':<10}{'delay':<22}{'false':<8}"
+        f"false after {NEAR_INTERCEPT:g} s",
+    ]
+    groups: dict[tuple[str, str, str, str], list[ResidualRow]] = {}
+    for row in rows:
+        groups.setdefault((row.noise, row.scenario, row.residual, row.rule), []).append(row)
+    for (noise, scenario, residual, rule), group in groups.items():
+        delays = [row.delay_s for row in group if row.delay_s is not None]
+        quiet = group[0].event_s is None
+        shown = "quiet" if quiet else "-"
+        if delays:
+            shown = f"{np.median(delays):.2f} ({min(delays):.2f} to {max(delays):.2f})"
+        reached = "" if quiet else f"{len(delays)}/{len(group)}"
+        false, late = (
+            sum(v > 0 for v in column)
+            for column in zip(*((row.false_alarms, row.late_false_alarms) for row in group), strict=True)
+        )
+        lines.append(
+            f"{scenario:<19}{noise:<10}{residual:<10}{rule:<10}{reached:<10}{shown:<22}"
+            f"{f'{false}/{len(group)}':<8}{f'{late}/{len(group)}'}"
+        )
+    return "\n".join(lines)
+
+
+def _order_text(rows: Sequence[OrderRow]) -> str:
+    lines = ["isolation by order in time", f"{'case':<19}{'noise':<10}{'found':<16}{'flights':<10}median delays [s]"]
+    groups: dict[tuple[str, str, str], list[OrderRow]] = {}
+    for row in rows:
+        groups.setdefault((row.noise, row.scenario, row.found_order or "nothing"), []).append(row)
+    totals = {key: sum(r.noise == key[0] and r.scenario == key[1] for r in rows) for key in groups}
+    for key, group in groups.items():
+        delays = np.array([[float(v) for v in row.isolation_delays_s.split()] for row in group])
+        shown = " ".join(f"{v:.2f}" for v in np.median(delays, axis=0)) if delays.size else ""
+        lines.append(f"{key[1]:<19}{key[0]:<10}{key[2]:<16}{f'{len(group)}/{totals[key]}':<10}{shown}")
+    wrong = sum(row.wrong for row in rows)
+    missed = sum(not row.sizes_contain_truth for row in rows)
+    lines.append(f"wrong orders: {wrong}/{len(rows)}; bounds of a size that miss the truth: {missed}/{len(rows)}")
+    return "\n".join(lines)
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Folder of tables and pictures.")],
+    runs: Annotated[int, typer.Option(min=1, help="Flights of each case and noise set.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Seed that all flights' seeds are spawned from.")] = 0,
+    model_error: Annotated[float, typer.Option(help="Largest relative error of the force coefficients.")] = 0.0,
+) -> None:
+    """Fly the missile's scenarios over many seeds; write tables and pictures, and print the tables."""
+    from aircraft.missile.figures import write_figures
+    from aircraft.missile.imu import NOISE_SETS
+
+    out.mkdir(parents=True, exist_ok=True)
+    flights = Flights(model_error=model_error)
+    study = run_study(runs, seed, tuple(NOISE_SETS), flights)
+    study.write(out)
+    write_figures(out, flights, seed)
+    typer.echo(study.to_text())
+
+
+if __name__ == "__main__":
+    typer.run(main)

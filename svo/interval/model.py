@@ -1,0 +1,84 @@
+"""The same first-order plant as a 1-D `UncertainModel`, for set-valued observers.
+
+With g = gc + gr Delta and |Delta| <= 1, x+ = gc x + (1 - gc) hc u + Delta gr (x - hc u) + d: one channel, and a
+disturbance |d| <= (|1 - gc| + gr) hr |u| for the static gain. Its reachable interval is that of the predictor, so an
+observer of this model, which also uses the measurements, stays inside the prediction made with the same gc and gr.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.interval.predictor import IntervalPrediction, IntervalPredictor
+from svo.log import Log
+from svo.model import UncertainModel
+from svo.uncertainty import Uncertainty
+
+Array = NDArray[np.float64]
+
+
+def first_order_model(noise: float, Ts: float) -> UncertainModel:
+    """The uncertain model of x+ = g x + (1 - g) h u, y = x + noise, scheduled by the bounds of g and h.
+
+    Parameters
+    ----------
+    noise : float
+        Half-width of the measurement noise. A set-valued observer needs one; the interval detector does not.
+    Ts : float
+        Sampling time [s].
+
+    Returns
+    -------
+    UncertainModel
+        Its schedule is a row (gc, gr, hc, spread) of `first_order_schedule`.
+    """
+    return UncertainModel(
+        A=lambda s: [[s[0]]],
+        B=lambda s: [[(1 - s[0]) * s[2]]],
+        C=[[1.0]],
+        E=[[1.0]],
+        w=(lambda s: np.array([-s[3]]), lambda s: np.array([s[3]])),
+        n=noise,
+        Ts=Ts,
+        uncertainties=[Uncertainty(A=lambda s: [[s[1]]], B=lambda s: [[-s[1] * s[2]]], name="g")],
+        schedule=np.array([0.5, 0.1, 1.0, 0.0]),
+    )
+
+
+def first_order_schedule(prediction: IntervalPrediction) -> Log:
+    """The log of a prediction with the schedule (K, 4) of `first_order_model`: gc, gr, hc and spread at each sample."""
+    p = prediction
+    spread = (np.abs(1 - p.gc) + p.gr) * p.hr * np.abs(p.u)
+    schedule: Any = np.column_stack([p.gc, p.gr, p.hc, spread])
+    return Log(time=p.time, u=p.u[:, None], y=p.y[:, None], schedule=schedule)
+
+
+class FirstOrderScheduler:
+    """The schedule of `first_order_model` sample by sample, by a predictor that runs along (a `svo.plant.Scheduler`).
+
+    Parameters
+    ----------
+    predictor : function of the first command
+        Gives the predictor, once the first sample is there.
+    """
+
+    def __init__(self, predictor: Callable[[float], IntervalPredictor]) -> None:
+        self._make = predictor
+        self._predictor: IntervalPredictor | None = None
+        self._held = 0.0
+
+    def with_input(self, y: Array, u: Array) -> Array:
+        """gc, gr, hc and spread (4,) of the transition that starts at this sample, from its y (1,) and u (1,)."""
+        command, measured = float(u[0]), float(y[0])
+        if self._predictor is None:
+            self._predictor = self._make(command)
+            self._held = self._predictor.interval.center
+        if not np.isnan(measured):
+            self._held = measured
+        _, bounds = self._predictor.transition(command, self._held)
+        gc, gr, hc, hr = (float(getattr(bounds, name)) for name in ("gc", "gr", "hc", "hr"))
+        return np.array([gc, gr, hc, (abs(1 - gc) + gr) * hr * abs(command)])

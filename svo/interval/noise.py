@@ -1,0 +1,184 @@
+"""Characterisation of a noise by the extremes of its moving averages (paper 001, equations (5)-(7))."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from svo.interval.power_law import DEFAULT_EXPONENTS, PowerLaw, smallest_power_law
+from svo.interval.thresholds import checked_bounds, threshold_sequence
+
+Array = NDArray[np.float64]
+
+_BLOCK = 4096  # samples whose partial sums are made at once: they stay in the cache, and short sums round little
+
+
+@dataclass(frozen=True, eq=False)
+class CharacterizationCheck:
+    """Whether other records keep to a characterisation: assumption (7), q by q.
+
+    Attributes
+    ----------
+    observed : (qbar,) array
+        Largest moving average of the records over q samples, in size; NaN where no record is that long.
+    bounds : (qbar,) array
+        lambda_q of the characterisation.
+    """
+
+    observed: Array
+    bounds: Array
+
+    @property
+    def violated(self) -> NDArray[np.int64]:
+        """The window lengths q at which (7) fails, in order."""
+        return np.flatnonzero(self.observed > self.bounds) + 1
+
+    @property
+    def holds(self) -> bool:
+        return not self.violated.size
+
+    @property
+    def ratio(self) -> Array:
+        """observed / bounds, (qbar,): above one where (7) fails; 0 / 0 is 0."""
+        bounds = np.where(self.bounds > 0, self.bounds, 1.0)
+        return np.where(self.bounds > 0, self.observed / bounds, np.where(self.observed > 0, np.inf, self.observed))
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseCharacterization:
+    """Bounds lambda_q of a signal's moving averages over q = 1..qbar samples.
+
+    Attributes
+    ----------
+    bounds : (qbar,) array
+        ``bounds[q - 1]`` is lambda_q >= 0.
+
+    Notes
+    -----
+    Whatever is derived from it holds for signals that keep to it (assumption (7)). That is a statement about the
+    future which no record proves: `check` it on other records.
+    """
+
+    bounds: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bounds", checked_bounds(self.bounds))
+
+    @classmethod
+    def from_records(
+        cls, records: ArrayLike | Sequence[ArrayLike], qbar: int, safety_factor: float = 1.2
+    ) -> NoiseCharacterization:
+        """lambda_q = safety_factor max over all records and k of |mean of the q samples up to k|, full windows only.
+
+        Parameters
+        ----------
+        records : (n,) array, or a sequence of them
+            Signals of fault-free operation, in any number and of any lengths; NaN (no measurement) is left out.
+        qbar : int
+            Longest window; at least one record must be that long.
+        safety_factor : float
+            zeta > 1: room for what the records did not show.
+
+        Raises
+        ------
+        ValueError
+            For records that are too short or not finite, qbar < 1 or a safety factor <= 1.
+        """
+        if not (np.isfinite(safety_factor) and safety_factor > 1):
+            raise ValueError(f"safety_factor is {safety_factor}; expected a number > 1, such as 1.2")
+        signals = _signals(records)
+        longest = max(s.size for s in signals)
+        if not 1 <= qbar <= longest:
+            raise ValueError(
+                f"qbar is {qbar} with a longest record of {longest} samples; expected 1 <= qbar <= {longest}"
+            )
+        return cls(safety_factor * moving_average_extremes(signals, qbar))
+
+    @property
+    def qbar(self) -> int:
+        """Longest window."""
+        return int(self.bounds.size)
+
+    @property
+    def peak(self) -> float:
+        """lambda_1, the bound of a single sample."""
+        return float(self.bounds[0])
+
+    @property
+    def variability(self) -> float:
+        """How fast the moving averages fall with their length: 0 (a constant signal) to 1.
+
+        sum over q = 2..qbar of (1 - lambda_q / lambda_1) / q^2, normalised by the sum of 1 / q^2: the paper's v(u)
+        normalises by the infinite sum, which a finite qbar never reaches. Zero also if lambda_1 is zero or qbar is 1.
+        """
+        if self.peak == 0 or self.qbar == 1:
+            return 0.0
+        weights = 1.0 / np.arange(2, self.qbar + 1) ** 2
+        return float(weights @ (1 - self.bounds[1:] / self.peak) / weights.sum())
+
+    def check(self, records: ArrayLike | Sequence[ArrayLike]) -> CharacterizationCheck:
+        """Assumption (7) on other fault-free records: which lambda_q they exceed."""
+        return CharacterizationCheck(moving_average_extremes(_signals(records), self.qbar), self.bounds)
+
+    def thresholds(self, pole: float) -> Array:
+        """Thresholds tau_k of the filtered signal, (qbar + 1,), for k = 0..qbar; constant from qbar on (11)-(13)."""
+        return threshold_sequence(self.bounds, pole)
+
+    def power_law(self, exponents: ArrayLike = DEFAULT_EXPONENTS) -> PowerLaw:
+        """The smallest alpha q^gamma + beta that is nowhere below lambda_q; see `smallest_power_law`."""
+        return smallest_power_law(self.bounds, exponents)
+
+
+def moving_average_extremes(signals: Sequence[Array], qbar: int) -> Array:
+    """Largest |mean over q samples| in all signals, (qbar,); NaN where no signal has q samples.
+
+    Time O(n qbar), vectorised by the compiler over q; rounding stays at some 1e-12 of the largest sample.
+    """
+    best = np.zeros(qbar)
+    for signal in signals:
+        _extreme_sums(signal, best, _BLOCK)
+    best[max(s.size for s in signals) :] = np.nan
+    return best / np.arange(1, qbar + 1)
+
+
+def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
+    several: Sequence[ArrayLike] = records  # type: ignore[assignment]
+    single = len(several) > 0 and np.ndim(several[0]) == 0
+    found = []
+    for i, record in enumerate([records] if single else several):
+        signal = np.asarray(record, dtype=float)
+        if signal.ndim != 1:
+            raise ValueError(f"record {i} has shape {signal.shape}; expected (n,), or a sequence of such records")
+        signal = np.ascontiguousarray(signal[~np.isnan(signal)])
+        if not signal.size or not np.isfinite(signal).all():
+            raise ValueError(f"record {i} is empty or has infinite samples; expected finite numbers")
+        found.append(signal)
+    if not found:
+        raise ValueError("records is empty; expected at least one record of fault-free operation")
+    return found
+
+
+@njit(cache=True)
+def _extreme_sums(u, best, block):  # type: ignore[no-untyped-def]
+    """Raise best[q - 1] to the largest |sum of q consecutive samples of u|, for every q with a full window.
+
+    ``sums`` holds the partial sums of a block and of the qbar samples before it backwards, so that the inner loop
+    walks two arrays side by side.
+    """
+    qbar = best.size
+    sums = np.empty(block + qbar)
+    for start in range(0, u.size, block):
+        first, stop = max(0, start - qbar + 1), min(start + block, u.size)
+        m = stop - first
+        sums[m] = 0.0
+        for i in range(m):
+            sums[m - i - 1] = sums[m - i] + u[first + i]
+        for j in range(start - first + 1, m + 1):
+            now, before = sums[m - j], sums[m - j + 1 : m - j + 1 + min(qbar, j)]
+            for q in range(before.size):
+                size = abs(now - before[q])
+                best[q] = size if size > best[q] else best[q]
