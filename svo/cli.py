@@ -22,6 +22,7 @@ from svo.cli_output import (
 
 if TYPE_CHECKING:
     from svo.alarms import Alarm, AlarmCheck
+    from svo.interval.study import LearnsDetectors
     from svo.log import Log
     from svo.plant import Plant
     from svo.study.configuration import StudyConfiguration
@@ -336,6 +337,13 @@ def compare(
     rate: Annotated[
         float, typer.Option(min=0.0, max=0.5, help="Share of fault-free runs that may raise an alarm.")
     ] = 0.02,
+    healthy_runs: Annotated[
+        int | None, typer.Option(min=1, help="Fault-free runs to tune on, and again to judge. [default: 100 and 200]")
+    ] = None,
+    distribution: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="bounded or gaussian noise; may be repeated. [default: both]"),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Set detectors side by side: the same runs, the same optimiser, the same false-alarm rate, other seeds to judge.
@@ -346,9 +354,12 @@ def compare(
     \b
     Example:
       svo compare eclipse --runs 100 --seed 0 --workers 2 --out comparison
+      svo compare elevator --noise quiet --runs 20 --healthy-runs 50 --out comparison
     """
     with _one_line_errors():
-        from svo.comparison.comparison import Comparison, run_comparison
+        from dataclasses import replace
+
+        from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
         from svo.comparison.publish import publish_comparison, to_text
         from svo.plant import load_plant
         from svo.progress import progress
@@ -357,7 +368,13 @@ def compare(
         the_plant = load_plant(plant)
         noise = _noise(the_plant, noise)
         check_noise(the_plant, noise)
-        comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate)
+        for name in distribution or ():
+            if name not in DISTRIBUTIONS:
+                raise ValueError(f"distribution is {name!r}; expected one of {', '.join(DISTRIBUTIONS)}")
+        chosen = tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS))
+        comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
+        if healthy_runs is not None:
+            comparison = replace(comparison, healthy_training=healthy_runs, healthy_runs=healthy_runs)
         _announce(PREPARING)
         with progress("Detectors") as update:
             compared = run_comparison(comparison, workers, update)
@@ -388,7 +405,7 @@ def _fail(message: str, code: int = 1) -> None:
 
 
 def _study_detectors(
-    the_plant: Plant, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
+    the_plant: LearnsDetectors, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
 ) -> None:
     from svo.interval.study import publish, run_detection_study
     from svo.progress import progress

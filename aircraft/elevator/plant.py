@@ -13,6 +13,7 @@ from aircraft.elevator.gains import ServoGains
 from aircraft.elevator.scenarios import COMMANDS, DURATION, SCENARIOS, TRAVEL, TS, Scenario, SensorNoise
 from aircraft.elevator.servo import Servo
 from polytopes import HPolytope
+from svo.comparison.detector import Detector
 from svo.faults import ActuatorFault
 from svo.interval import (
     FirstOrderScheduler,
@@ -27,7 +28,7 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
-from svo.plant import HEALTHY, Column, Columns, Reference
+from svo.plant import HEALTHY, Column, Columns, Distribution, Reference
 
 Array = NDArray[np.float64]
 
@@ -148,6 +149,22 @@ class Elevator:
     def interval_detectors(self, noise: NoiseCharacterization, first_command: float) -> dict[str, IntervalDetector]:
         """The paper's detectors, one for each pole of the residual filter, named as in Table 1."""
         return {f"a = {a:g}": IntervalDetector(self.predictor(first_command), noise, a) for a in POLES}
+
+    @property
+    def compared_faults(self) -> tuple[tuple[str, str], ...]:
+        """The paper's three scenarios, and the oscillation that the loop still follows its command under."""
+        return (*TABLE_1, ("oscillation", "liquid"))
+
+    def with_noise(self, distribution: Distribution) -> Elevator:
+        """This plant with its noise clipped at the noise set's bound, or Gaussian."""
+        return replace(self, gaussian=distribution == "gaussian")
+
+    def detectors(self, noise: str) -> list[Detector]:
+        """The detectors to compare, with any noise set; see `aircraft.elevator.detectors`."""
+        from aircraft.elevator.detectors import detectors
+
+        self._bound(noise)
+        return detectors(self.predictor, POLES, QBAR, self.sensor.sigma, self.Ts)
 
     @property
     def detection_reference(self) -> dict[tuple[str, str], dict[str, float]]:

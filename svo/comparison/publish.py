@@ -8,11 +8,16 @@ from pathlib import Path
 from svo.comparison.comparison import Compared
 from svo.comparison.picture import plot_comparison
 from svo.comparison.table import ComparisonRow, comparison_table, write_runs, write_table
-from svo.plant import Plant
+from svo.interval.study.run import LearnsDetectors
+from svo.interval.study.run_figures import write_run_figures
+from svo.plant import Plant, fault_start
 
 
 def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[ComparisonRow]:
-    """Write comparison.csv, runs.csv and comparison.png into a folder; returns the table."""
+    """Write comparison.csv, runs.csv and pictures into a folder; returns the table.
+
+    The pictures are comparison.png and, of a plant with interval detectors, runs of these (run_*.png).
+    """
     import matplotlib
 
     matplotlib.use("agg")
@@ -20,9 +25,11 @@ def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[Comp
     rows = comparison_table(compared)
     write_table(out / "comparison.csv", rows)
     write_runs(out / "runs.csv", compared.rows)
-    longest = max(plant.duration(row.fault, row.profile) for row in rows) - plant.fault_time
+    longest = max(plant.duration(row.fault, row.profile) - fault_start(plant, row.fault, row.profile) for row in rows)
     figure = plot_comparison(rows, compared.comparison.rate, plant.Ts, longest)
     figure.savefig(out / "comparison.png", dpi=130)
+    if isinstance(plant, LearnsDetectors):
+        write_run_figures(out, plant, compared.comparison.noise, compared.comparison.seed)
     return rows
 
 

@@ -29,7 +29,8 @@ class ComparisonRow:
     false_alarms : Share
         Of the judged runs WITHOUT a fault of this distribution; the same in every row of a detector.
     detect : Delays
-        To the first alarm from the fault on; None where there was none.
+        To the first alarm from the fault on; None where there was none, or one before the fault: that is a false
+        alarm and no detection.
     settled : Delays
         To the last switch from false to true (section 2.4): an alarm that drops out again is not settled.
     non_detection_rate : float or None
@@ -127,7 +128,7 @@ def _row(
         fault,
         profile,
         false_alarms=Share(sum(run.false_alarm for run in healthy), len(healthy)),
-        detect=Delays.of([run.first_alarm_s for run in runs]),
+        detect=Delays.of([None if run.false_alarm else run.first_alarm_s for run in runs]),
         settled=Delays.of([run.delay_s for run in runs]),
         non_detection_rate=float(np.mean(missed)) if missed else None,
         isolate=Delays.of([run.isolation_delay_s for run in runs]),

@@ -19,10 +19,12 @@ from svo.interval.study.summary import (
     summarise_assumption,
     write_summary,
 )
-from svo.plant import HEALTHY, Plant
+from svo.plant import HEALTHY
 from svo.study.figures import Picture
 from svo.study.report import html_facts, html_figure, html_table, write_page
 from svo.study.store import StudyFolder
+from svo.study.summary import Share
+from svo.study.tables import TextTable
 
 _GLOSSARY = {
     "alarm": "The filtered residual is beyond its threshold. It is a statistical alarm, not a proof: it rests on "
@@ -42,7 +44,7 @@ class DetectionStudy:
 
     summaries: list[DetectorSummary]
     assumption: list[AssumptionSummary]
-    tables: list[Any]
+    tables: list[TextTable]
     findings: list[str]
 
     def to_dict(self) -> dict[str, Any]:
@@ -62,9 +64,8 @@ class DetectionStudy:
         }
 
 
-def publish(folder: StudyFolder, plant: Plant) -> DetectionStudy:
+def publish(folder: StudyFolder, plant: LearnsDetectors) -> DetectionStudy:
     """Write summary.csv, the pictures and report.html into the study's folder."""
-    assert isinstance(plant, LearnsDetectors)
     rows = read_rows(folder)
     summaries, assumption = summarise(plant, rows), summarise_assumption(rows)
     write_summary(folder.path / "summary.csv", summaries)
@@ -99,7 +100,7 @@ def _before_the_fault(summaries: Sequence[DetectorSummary]) -> list[str]:
 
 
 def _write_report(
-    path: Path, plant: Plant, identity: Mapping[str, Any], study: DetectionStudy, pictures: Sequence[Picture]
+    path: Path, plant: LearnsDetectors, identity: Mapping[str, Any], study: DetectionStudy, pictures: Sequence[Picture]
 ) -> None:
     configuration = identity["configuration"]
     runs = f"{configuration['runs']} runs of each scenario, seed {configuration['seed']}"
@@ -141,5 +142,5 @@ def _plain(s: DetectorSummary) -> dict[str, Any]:
     )
 
 
-def _share(share: Any) -> dict[str, Any]:
+def _share(share: Share) -> dict[str, Any]:
     return {"count": share.count, "of": share.of, "interval": list(share.interval)}

@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from svo.interval.detector import IntervalDetector
 from svo.interval.noise import NoiseCharacterization
 from svo.log import Log
-from svo.plant import HEALTHY, fault_start
+from svo.plant import HEALTHY, Plant
 from svo.study.configuration import Job
+from svo.study.run import first_faulty_sample
 
 LEARNING_RECORDS = (1, 5)
 
 
 @runtime_checkable
-class LearnsDetectors(Protocol):
-    """What a `svo.plant.Plant` offers besides if its study is one of interval detectors, not of an isolation bank.
+class LearnsDetectors(Plant, Protocol):
+    """A plant whose study is one of interval detectors, not of an isolation bank.
 
     Attributes
     ----------
@@ -95,7 +96,7 @@ def execute(plant: LearnsDetectors, job: Job) -> list[DetectorRow]:
 
     The records' seeds are spawned from that of the run; the first of them is the only one of the smallest number.
     """
-    log: Log = plant.simulate(job.fault, job.profile, job.noise, job.seed)  # type: ignore[attr-defined]
+    log: Log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     seeds = np.random.SeedSequence(job.seed).spawn(max(LEARNING_RECORDS))
     records = [plant.learning_log(job.noise, seed) for seed in seeds]
     healthy = job.fault == HEALTHY
@@ -118,10 +119,9 @@ def _judge(
     alarm: NDArray[np.bool_],
     violated: tuple[int, ...],
 ) -> DetectorRow:
-    first = len(log)
-    Ts = float(log.time[1] - log.time[0])
+    first, Ts = len(log), plant.Ts
     if job.fault != HEALTHY:
-        first = round((fault_start(plant, job.fault, job.profile) - float(log.time[0])) / Ts)  # type: ignore[arg-type]
+        first = first_faulty_sample(plant, job, log)
     hits, after = np.flatnonzero(alarm), np.flatnonzero(alarm[first:])
     return DetectorRow(
         run=job.run,

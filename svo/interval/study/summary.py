@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from svo.interval.study.run import DetectorRow, LearnsDetectors
-from svo.plant import HEALTHY, Plant, fault_start
+from svo.plant import HEALTHY, fault_start
 from svo.study.summary import Delays, Share
 
 _HEADER = (
@@ -72,9 +72,8 @@ class AssumptionSummary:
     by_window: dict[int, int]
 
 
-def summarise(plant: Plant, rows: Iterable[DetectorRow]) -> list[DetectorSummary]:
+def summarise(plant: LearnsDetectors, rows: Iterable[DetectorRow]) -> list[DetectorSummary]:
     """One summary per noise set, fault, profile, number of records and detector, in the order of their first runs."""
-    assert isinstance(plant, LearnsDetectors)
     groups: dict[tuple[str, str, str, int, str], list[DetectorRow]] = {}
     for row in rows:
         groups.setdefault((row.noise, row.fault, row.profile, row.records, row.detector), []).append(row)

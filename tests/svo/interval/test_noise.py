@@ -105,13 +105,6 @@ def test_a_signal_without_variability_has_the_threshold_lambda_1() -> None:
     assert NoiseCharacterization(np.full(30, 0.7)).thresholds(0.9) == pytest.approx(np.full(31, 0.7))
 
 
-def test_propositions_hold_on_all_signals() -> None:
-    checks, wrong = violations(samples=200, seeds=1)
-    assert checks > 30_000
-    assert wrong == 0
-
-
-@pytest.mark.slow
 def test_propositions_hold_in_more_than_half_a_million_checks() -> None:
     checks, wrong = violations(samples=600, seeds=8)
     assert checks > 500_000

@@ -155,9 +155,7 @@ def test_without_uncertainty_it_is_the_full_information_window(seed: int, shared
 @pytest.mark.parametrize("horizon", [1, 3])
 def test_without_uncertainty_the_published_form_is_exact(horizon: int) -> None:
     rng = np.random.default_rng(7)
-    model = UncertainModel(
-        [[0.9, 0.3], [-0.2, 0.8]], None, [[1.0, 0.0]], E=[[0.1], [1.0]], w=[0.2], n=[0.3], c=[0.5]
-    )
+    model = UncertainModel([[0.9, 0.3], [-0.2, 0.8]], None, [[1.0, 0.0]], E=[[0.1], [1.0]], w=[0.2], n=[0.3], c=[0.5])
     log = model.simulate([0.5, 0.5], np.zeros((6, 0)), rng)
     initial = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
     with pytest.warns(UserWarning, match="equation"):

@@ -1,0 +1,45 @@
+"""The comparison on the elevator: what is published of rows made by hand, and the words of the command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from svo.cli import app
+from svo.comparison.comparison import Compared, Comparison
+from svo.comparison.detector import Setting
+from svo.comparison.publish import publish_comparison
+from svo.comparison.run import ComparedRun
+from svo.comparison.tuning import Tuned
+from svo.plant import load_plant
+
+
+def row(fault: str, profile: str, alarm: float | None) -> ComparedRun:
+    blank = (None, None, None, None, 2.0, 0.1)
+    return ComparedRun("bounded", "interval, a = 0.9", fault, profile, 0, alarm, alarm, False, *blank)
+
+
+def test_the_paper_s_figures_are_drawn_beside_the_comparison(tmp_path: Path) -> None:
+    rows = [row("none", "none", None), row("jam", "steady", 0.5), row("jam", "moving", None)]
+    tuned = {("bounded", "interval, a = 0.9"): Tuned(Setting(1.25), 0.0, 1)}
+    compared = Compared(Comparison("elevator", "quiet"), {"interval, a = 0.9": "threshold"}, tuned, rows)
+    table = publish_comparison(tmp_path, compared, load_plant("elevator"))
+    assert [(r.fault, r.profile, r.detect.reached.count) for r in table] == [("jam", "steady", 1), ("jam", "moving", 0)]
+    assert {path.name for path in tmp_path.glob("*.png")} == {
+        "comparison.png", "run_faults.png", "run_healthy.png", "run_zoom.png"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--distribution", "cauchy"], "distribution is 'cauchy'; expected one of bounded, gaussian"),
+        (["--noise", "loud"], "no noise set 'loud'"),
+    ],
+)
+def test_the_command_says_what_it_knows(tmp_path: Path, arguments: list[str], message: str) -> None:
+    answer = CliRunner().invoke(app, ["compare", "elevator", "--out", str(tmp_path / "out"), *arguments])
+    assert answer.exit_code == 1
+    assert message in answer.output
