@@ -157,7 +157,7 @@ class Missile:
         return MeasuredSchedule()
 
     def with_noise(self, distribution: Distribution) -> Missile:
-        """This missile with bounded or Gaussian noise of the same standard deviation; models and bounds are unchanged."""
+        """This missile with bounded or Gaussian noise of the same deviation; models and bounds are unchanged."""
         return replace(self, distribution=distribution)
 
     def detectors(self, noise: str) -> list[Detector]:

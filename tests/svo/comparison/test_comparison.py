@@ -5,14 +5,22 @@ import json
 
 import numpy as np
 import pytest
-from small_plant import SmallPlant
+from compared_plant import SmallPlant
 
 from svo.comparison import comparison as module
 from svo.comparison.comparison import Comparison, run_comparison
 from svo.comparison.publish import publish_comparison, to_text
 
 COMPARISON = Comparison(
-    "small", "usual", runs=12, healthy_training=40, healthy_runs=40, faulty_training=3, evaluations=5, rate=0.05
+    "small",
+    "usual",
+    runs=12,
+    healthy_training=20,
+    healthy_calibration=59,
+    healthy_runs=40,
+    faulty_training=3,
+    evaluations=5,
+    rate=0.05,
 )
 
 
@@ -118,7 +126,8 @@ def test_a_plant_without_detectors_is_refused(monkeypatch):
 @pytest.mark.slow
 def test_the_rows_do_not_depend_on_the_number_of_workers():
     module.compared_plant.cache_clear()
-    small = Comparison("eclipse", "quiet", runs=1, healthy_training=3, healthy_runs=2, faulty_training=1, evaluations=2)
+    few = {"runs": 1, "healthy_training": 3, "healthy_calibration": 3, "healthy_runs": 2, "faulty_training": 1}
+    small = Comparison("eclipse", "quiet", **few, evaluations=2)
     one, two = run_comparison(small, 1), run_comparison(small, 2)
     assert [{**vars(r), "microseconds_per_sample": 0} for r in one.rows] == [
         {**vars(r), "microseconds_per_sample": 0} for r in two.rows

@@ -1,6 +1,6 @@
 """A plant of one state that offers detectors, small enough to compare in a second."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class SmallPlant:
     Ts: float = TS
     fault_time: float = FAULT_TIME
     noise_sets: tuple = ("usual",)
-    columns: Columns = Columns(inputs=(), outputs=())
+    columns: Columns = field(default_factory=lambda: Columns(inputs=(), outputs=()))
     reference_title: str = ""
     compared_faults: tuple = (("first", "step"), ("second", "step"))
 
