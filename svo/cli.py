@@ -458,7 +458,7 @@ def calibrate(
 def compare(
     plant: PlantName,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for comparison.csv, runs.csv and comparison.png.")],
-    runs: Annotated[int, typer.Option(min=1, help="Judged runs of each fault, profile and noise.")] = 100,
+    runs: Annotated[int, typer.Option(min=1, help="Judged runs of each fault, profile and noise.")] = 50,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison; the same seed gives the same runs.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
     or 1,
@@ -467,7 +467,8 @@ def compare(
         float, typer.Option(min=0.0, max=0.5, help="Share of fault-free runs that may raise an alarm.")
     ] = 0.02,
     healthy_runs: Annotated[
-        int | None, typer.Option(min=1, help="Fault-free runs to tune on, and again to judge. [default: 100 and 200]")
+        int | None,
+        typer.Option(min=1, help="Fault-free runs to set levels on, and again to judge. [default: 300 and 200]"),
     ] = None,
     distribution: Annotated[
         list[str] | None,
@@ -482,7 +483,7 @@ def compare(
 
     \b
     Example:
-      svo compare eclipse --runs 100 --seed 0 --workers 2 --out comparison
+      svo compare eclipse --runs 50 --seed 0 --workers 2 --out comparison
       svo compare elevator --noise quiet --runs 20 --healthy-runs 50 --out comparison
     """
     with _one_line_errors():
@@ -503,7 +504,7 @@ def compare(
         chosen = tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS))
         comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
         if healthy_runs is not None:
-            comparison = replace(comparison, healthy_training=healthy_runs, healthy_runs=healthy_runs)
+            comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
         _announce(PREPARING)
         with progress("Detectors") as update:
             compared = run_comparison(comparison, workers, update)

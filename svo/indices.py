@@ -1,7 +1,8 @@
-"""Performance indices of a Boolean decision (Marzat et al. 2012, section 2.4 and Figure 2)."""
+"""Performance indices of detection and of isolation (Marzat et al. 2012, section 2.4 and Figure 2)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +93,43 @@ def detection_indices(
         false_detection_rate=_share(durations[before], alarm[before]),
         non_detection_rate=_share(durations[after], ~alarm[after]),
     )
+
+
+def isolation_indices(
+    time: ArrayLike,
+    isolated: Sequence[str | None],
+    faults: Sequence[str],
+    t_from: float,
+    t_on: float | None = None,
+    t_hor: float | None = None,
+) -> dict[str, DetectionIndices]:
+    """The indices of each decision "this fault is isolated", by fault.
+
+    With the fault that is there they tell of its isolation; with another one every number but an infinite delay is
+    that of a wrong isolation: its first, and 1 - non_detection_rate the share of the time that it stood.
+
+    Parameters
+    ----------
+    time : (K,) array
+        As for `detection_indices`, and so are t_from, t_on and t_hor.
+    isolated : sequence of K str or None
+        The fault that is isolated at each sample, None where none is.
+    faults : sequence of str
+        All faults that may be isolated.
+
+    Raises
+    ------
+    ValueError
+        If the times do not fit, or a fault is isolated that is not among the faults.
+    """
+    names = np.array([None, *isolated], dtype=object)[1:]
+    unknown = sorted({str(name) for name in names if name is not None and name not in faults})
+    if unknown:
+        raise ValueError(f"isolated names {', '.join(unknown)}; expected None or one of {', '.join(faults)}")
+    return {
+        fault: detection_indices(time, np.array([name == fault for name in names], dtype=bool), t_from, t_on, t_hor)
+        for fault in faults
+    }
 
 
 def _share(durations: Array, true: NDArray[np.bool_]) -> float:

@@ -7,6 +7,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_sta
 
 Progress = Callable[[int, int], None]
 DISTRIBUTIONS: tuple[Distribution, ...] = ("bounded", "gaussian")
-_TRAINING, _JUDGING = 0, 1  # branches of the seed
+_TRAINING, _JUDGING, _CALIBRATION = 0, 1, 2  # branches of the seed
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,9 @@ class Comparison:
     rate : float
         False-alarm rate that every tuned detector gets: the share of fault-free runs with an alarm.
     healthy_training, faulty_training : int
-        Training runs without a fault, and of each scenario.
+        Training runs without a fault, and of each scenario, to learn from and to find inner parameters.
+    healthy_calibration : int
+        Further training runs without a fault, to set the level at which every detector has the rate.
     healthy_runs : int
         Judged runs without a fault.
     evaluations : int
@@ -47,17 +50,19 @@ class Comparison:
 
     plant: str
     noise: str
-    runs: int = 100
+    runs: int = 50
     seed: int = 0
     rate: float = 0.02
-    healthy_training: int = 100
+    healthy_training: int = 50
     faulty_training: int = 10
+    healthy_calibration: int = 300
     healthy_runs: int = 200
     evaluations: int = 15
     distributions: tuple[Distribution, ...] = DISTRIBUTIONS
 
     def __post_init__(self) -> None:
-        for name in ("runs", "healthy_training", "faulty_training", "healthy_runs", "evaluations"):
+        training = ("healthy_training", "faulty_training", "healthy_calibration")
+        for name in ("runs", *training, "healthy_runs", "evaluations"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected at least 1")
         if not 0 <= self.rate < 1:
@@ -148,7 +153,22 @@ def _tune(comparison: Comparison, plant: Plant, detector: Detector, scenarios: S
             else:
                 first = round((fault_start(plant, fault, profile) - float(log.time[0])) / plant.Ts)
                 faulty.append(FaultyRun(f"{fault} {profile}", detector.prepare(log), first))
-    return tune(detector, healthy, faulty, comparison.rate, comparison.evaluations)
+    calibration = _Prepared(plant, detector, comparison)
+    return tune(detector, healthy, faulty, calibration, comparison.rate, comparison.evaluations)
+
+
+class _Prepared(Sequence[Any]):
+    """The calibration runs, simulated as they are asked for: all at once they fill the memory."""
+
+    def __init__(self, plant: Plant, detector: Detector, comparison: Comparison) -> None:
+        self._plant, self._detector, self._noise = plant, detector, comparison.noise
+        self._seeds = comparison.seeds(_CALIBRATION, 0, comparison.healthy_calibration)
+
+    def __len__(self) -> int:
+        return len(self._seeds)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._detector.prepare(self._plant.simulate(HEALTHY, HEALTHY, self._noise, self._seeds[index]))
 
 
 def _compile(detector: Detector, tuned: Tuned, log: Log) -> None:

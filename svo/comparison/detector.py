@@ -38,7 +38,7 @@ class Parameter:
         if not (np.isfinite([self.low, self.high]).all() and self.low < self.high):
             raise ValueError(f"low is {self.low} and high is {self.high}; expected finite numbers, low < high")
         if self.logarithmic and self.low <= 0:
-            raise ValueError(f"low is {self.low} on a logarithmic scale; expected a positive number")
+            raise ValueError(f"low is {self.low:g} on a logarithmic scale; expected a positive number")
 
     def at(self, fraction: float) -> float:
         """The value at a fraction in [0, 1] of the range."""

@@ -70,7 +70,7 @@ def _time_axis(ax: Axes, title: str, Ts: float, never: float) -> None:
     ax.set_title(title, fontsize=10)
     ax.set_xscale("log")
     ax.set_xlim(0.6 * Ts, never)
-    ticks = [t for t in (0.01, 0.1, 1.0, 10.0) if 0.6 * Ts < t < 0.7 * never]
+    ticks = [t for t in (0.01, 0.1, 1.0, 10.0) if 0.6 * Ts < t < 0.4 * never]
     ax.set_xticks([*ticks, never], [*(f"{t:g}" for t in ticks), "never"])
     ax.minorticks_off()
     ax.tick_params(axis="y", length=0)
@@ -85,8 +85,8 @@ def _false_alarms(ax: Axes, detectors: Sequence[str], rows: Sequence[ComparisonR
         low, high = share.interval
         ax.plot([100 * low, 100 * high], [y, y], color=COLOURS[distribution], linewidth=1.4)
         ax.plot(100 * share.value, y, "o", color=COLOURS[distribution], markersize=5, clip_on=False)
-    ax.axvline(100 * rate, color="#5B6470", linewidth=1, linestyle="--", label=f"tuned for: {100 * rate:g} %")
-    ax.set_title("false alarms [%]", fontsize=10)
+    ax.axvline(100 * rate, color="#5B6470", linewidth=1, linestyle="--")
+    ax.set_title(f"false alarms [%]\ntuned for {100 * rate:g} %", fontsize=10)
     ax.set_xscale("symlog", linthresh=5.0)
     ax.set_xlim(0, 100)
     ax.set_xticks([0, 2, 5, 20, 100], ["0", "2", "5", "20", "100"])
@@ -94,7 +94,6 @@ def _false_alarms(ax: Axes, detectors: Sequence[str], rows: Sequence[ComparisonR
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="both", color=_GRID, linewidth=0.6)
     ax.set_axisbelow(True)
-    ax.legend(loc="lower right", fontsize=7, frameon=True)
 
 
 def _legend(figure: Figure, distributions: Sequence[str]) -> None:

@@ -6,8 +6,8 @@ Marzat et al. 2012, section 6.3, ask for it.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ class Tuned:
     ----------
     setting : Setting
     cost : float
-        See `detection_cost`; NaN for a detector with a fixed setting.
+        `detection_cost` on the training runs; NaN for a detector whose setting is fixed, which has none.
     evaluations : int
         Settings that were tried.
     """
@@ -45,20 +45,30 @@ class Tuned:
 
 
 def tune(
-    detector: Detector, healthy: Sequence[Any], faulty: Sequence[FaultyRun], rate: float, evaluations: int
+    detector: Detector,
+    healthy: Sequence[Any],
+    faulty: Sequence[FaultyRun],
+    calibration: Sequence[Any],
+    rate: float,
+    evaluations: int,
 ) -> Tuned:
-    """The inner parameters of least cost, each tried at the level that gives the false-alarm rate.
+    """The inner parameters of least cost, and then the level that gives the false-alarm rate on other runs.
 
-    The optimiser is DIRECT (Jones et al. 1993): global, without derivatives, and deterministic.
+    The optimiser is DIRECT (Jones et al. 1993): global, without derivatives, and deterministic. It compares
+    parameters at levels from the same fault-free runs that they are chosen by, which favours parameters that were
+    lucky there; so the level is set anew on runs that had no part in the choice.
 
     Parameters
     ----------
     healthy : sequence of prepared fault-free logs
+        To learn from and to compare inner parameters.
     faulty : sequence of FaultyRun
+    calibration : sequence of prepared fault-free logs
+        To set the level; gone through once.
     rate : float
-        Share of fault-free runs that may raise an alarm, in [0, 1).
+        Expected share of fault-free runs that raise an alarm, in [0, 1).
     evaluations : int
-        Settings to try, at least one; detectors without inner parameters need one.
+        Settings to try, at least one; detectors without inner parameters need none.
 
     Raises
     ------
@@ -69,41 +79,54 @@ def tune(
         raise ValueError(f"rate is {rate}; expected a share of runs in [0, 1)")
     if evaluations < 1:
         raise ValueError(f"evaluations is {evaluations}; expected at least one")
-    if not healthy or not faulty:
-        raise ValueError(f"there are {len(healthy)} fault-free and {len(faulty)} faulty runs; expected some of each")
+    if not healthy or not faulty or not calibration:
+        counts = f"{len(healthy)} fault-free, {len(faulty)} faulty and {len(calibration)} calibration runs"
+        raise ValueError(f"there are {counts}; expected some of each")
     if detector.fixed is not None:
         return Tuned(detector.fixed, np.nan, 0)
+    parameters, tried = _search(detector, healthy, faulty, rate, evaluations)
+    setting = Setting(np.inf, parameters, detector.learn(parameters, healthy))
+    setting = replace(setting, level=level_at(detector, setting, calibration, rate))
+    return Tuned(setting, detection_cost(detector, setting, faulty), tried)
+
+
+def _search(
+    detector: Detector, healthy: Sequence[Any], faulty: Sequence[FaultyRun], rate: float, evaluations: int
+) -> tuple[dict[str, float], int]:
+    """Inner parameters of least cost, and how many settings were tried."""
     names = tuple(detector.parameters)
-    tried: dict[tuple[float, ...], tuple[float, Setting]] = {}
+    if not names:
+        return {}, 0
+    tried: dict[tuple[float, ...], float] = {}
 
     def cost(fractions: NDArray[np.float64]) -> float:
         values = tuple(detector.parameters[n].at(float(f)) for n, f in zip(names, fractions, strict=True))
         if values not in tried:  # whole numbers: many fractions are one setting
-            setting = setting_at(detector, dict(zip(names, values, strict=True)), healthy, rate)
-            tried[values] = (detection_cost(detector, setting, faulty), setting)
-        return tried[values][0]
+            parameters = dict(zip(names, values, strict=True))
+            setting = Setting(np.inf, parameters, detector.learn(parameters, healthy))
+            setting = replace(setting, level=level_at(detector, setting, healthy, rate))
+            tried[values] = detection_cost(detector, setting, faulty)
+        return tried[values]
 
-    cost(np.full(len(names), 0.5))
-    if names:
-        direct(cost, [(0.0, 1.0)] * len(names), maxfun=evaluations, eps=1e-3, locally_biased=False)
-    least, setting = min(tried.values(), key=lambda pair: pair[0])
-    return Tuned(setting, least, len(tried))
+    direct(cost, [(0.0, 1.0)] * len(names), maxfun=evaluations, eps=1e-3, locally_biased=False)
+    best = min(tried, key=lambda values: tried[values])
+    return dict(zip(names, best, strict=True)), len(tried)
 
 
-def setting_at(detector: Detector, parameters: Mapping[str, float], healthy: Sequence[Any], rate: float) -> Setting:
-    """The setting with these inner parameters whose level lets at most floor(rate * runs) fault-free runs alarm."""
-    blank = Setting(np.inf, parameters, detector.learn(parameters, healthy))
-    allowed = int(np.floor(rate * len(healthy) + 1e-9))
-    largest: list[float] = []  # the allowed + 1 largest critical levels so far; the least of them is the level
+def level_at(detector: Detector, setting: Setting, healthy: Sequence[Any], rate: float) -> float:
+    """The level at which the expected share of other fault-free runs with an alarm is the rate, or just below.
+
+    It is the j-th largest of the critical levels of n runs; a new run exceeds that with probability j / (n + 1), so
+    j = floor(rate (n + 1)). With fewer than 1 / rate - 1 runs it is the largest, and the rate 1 / (n + 1).
+    """
+    wanted = max(int(np.floor(rate * (len(healthy) + 1) + 1e-9)), 1)
+    largest: list[float] = []  # the wanted largest critical levels so far; the least of them is the floor of the next
     for prepared in healthy:
-        full = len(largest) > allowed
-        floor = largest[0] if full else 0.0
-        level = detector.critical_level(blank, prepared, floor)
-        if not full:
-            heapq.heappush(largest, level)
-        elif level > floor:
-            heapq.heapreplace(largest, level)
-    return Setting(largest[0], blank.parameters, blank.learned)
+        if len(largest) < wanted:
+            heapq.heappush(largest, detector.critical_level(setting, prepared, 0.0))
+        else:
+            heapq.heappushpop(largest, detector.critical_level(setting, prepared, largest[0]))
+    return largest[0]
 
 
 def detection_cost(detector: Detector, setting: Setting, faulty: Sequence[FaultyRun]) -> float:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svo.indices import detection_indices
+from svo.indices import detection_indices, isolation_indices
 
 TIME = np.arange(10) * 0.1
 
@@ -128,3 +128,18 @@ def test_against_a_count_sample_by_sample(decision: list[bool], fault: int, Ts: 
 def test_bad_arguments_are_refused(time: list[float], decision: list[bool], t_from: float, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         detection_indices(time, decision, t_from)
+
+
+def test_isolation_indices_are_those_of_each_decision():
+    time = np.arange(10) * 0.1
+    isolated = [None, None, "b", None, "a", None, "a", "a", "a", "a"]
+    found = isolation_indices(time, isolated, ("a", "b", "c"), t_from=0.3)
+    assert found["a"].first_alarm == pytest.approx(0.2)
+    assert found["a"].delay == pytest.approx(0.4)
+    assert found["a"].non_detection_rate == pytest.approx(2 / 7)
+    assert found["b"].false_alarm
+    assert found["b"].false_detection_rate == pytest.approx(1 / 3)
+    assert found["b"].delay == np.inf
+    assert found["c"].non_detection_rate == 1.0
+    with pytest.raises(ValueError, match="isolated names b, z"):
+        isolation_indices(time, [*isolated[:-1], "z"], ("a",), t_from=0.3)

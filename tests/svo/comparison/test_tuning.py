@@ -9,7 +9,7 @@ from compared_plant import BOX, SmallPlant, model
 from svo.comparison.detector import Parameter, Setting
 from svo.comparison.scaled_bounds import scaled_bounds
 from svo.comparison.threshold import ThresholdDetector
-from svo.comparison.tuning import FaultyRun, detection_cost, setting_at, tune
+from svo.comparison.tuning import FaultyRun, detection_cost, level_at, tune
 from svo.comparison.window_bank import WindowBank
 
 
@@ -28,21 +28,27 @@ class Scaled(ThresholdDetector):
         return np.concatenate([np.full(late, np.nan), prepared])[: len(prepared)]
 
 
-def test_level_lets_the_stated_share_of_runs_alarm():
+def test_level_gives_the_expected_share_of_other_runs():
     rng = np.random.default_rng(0)
-    healthy = [rng.random(50) for _ in range(200)]
-    for rate, allowed in ((0.0, 0), (0.02, 4), (0.1, 20)):
-        level = setting_at(Scaled(), {}, healthy, rate).level
-        assert level == sorted(run.max() for run in healthy)[-1 - allowed]
-        assert sum(Scaled().run(Setting(level), run).alarm.any() for run in healthy) == allowed
+    healthy = [rng.random(50) for _ in range(199)]
+    for rate, place in ((0.0, 1), (0.02, 4), (0.1, 20)):
+        level = level_at(Scaled(), Setting(np.inf), healthy, rate)
+        assert level == sorted(run.max() for run in healthy)[-place]
+        assert sum(Scaled().run(Setting(level), run).alarm.any() for run in healthy) == place - 1
+    shares = []
+    for _ in range(400):
+        level = level_at(Scaled(), Setting(np.inf), [rng.random(5) for _ in range(19)], 0.1)
+        shares.append(1 - level**5)
+    assert np.mean(shares) == pytest.approx(0.1, abs=0.01)
 
 
-def test_optimiser_finds_the_inner_parameter_of_least_delay():
+def test_optimiser_finds_the_inner_parameter_of_least_delay_and_the_level_comes_from_other_runs():
     rng = np.random.default_rng(1)
-    healthy = [rng.random(50) for _ in range(20)]
+    healthy, others = ([rng.random(50) for _ in range(20)] for _ in range(2))
     faulty = [FaultyRun("a", np.r_[np.zeros(10), np.full(40, 2.0)], 10)]
-    tuned = tune(Scaled(), healthy, faulty, 0.0, 30)
+    tuned = tune(Scaled(), healthy, faulty, others, 0.0, 30)
     assert tuned.setting.parameters["place"] == pytest.approx(0.3, abs=0.03)
+    assert tuned.setting.level == max(run.max() for run in others)
     assert tuned.cost == 0.0  # ln(1): at the first faulty sample
     assert tuned.evaluations <= 40
 
@@ -110,7 +116,7 @@ def test_scaled_bounds(scheduled):
 def test_parameters_are_searched_on_their_scale():
     assert Parameter(1.0, 100.0, logarithmic=True).at(0.5) == pytest.approx(10.0)
     assert Parameter(1, 8, integer=True).at(0.49) == 4.0
-    with pytest.raises(ValueError, match=r"low is 0\.0 on a logarithmic scale"):
+    with pytest.raises(ValueError, match=r"low is 0 on a logarithmic scale"):
         Parameter(0.0, 1.0, logarithmic=True)
     with pytest.raises(ValueError, match="expected finite numbers, low < high"):
         Parameter(1.0, 1.0)
@@ -118,8 +124,8 @@ def test_parameters_are_searched_on_their_scale():
 
 def test_tuning_refuses_what_it_cannot_use():
     with pytest.raises(ValueError, match="rate is 1"):
-        tune(Scaled(), [np.zeros(3)], [FaultyRun("a", np.zeros(3), 0)], 1.0, 5)
-    with pytest.raises(ValueError, match="0 fault-free and 1 faulty"):
-        tune(Scaled(), [], [FaultyRun("a", np.zeros(3), 0)], 0.1, 5)
+        tune(Scaled(), [np.zeros(3)], [FaultyRun("a", np.zeros(3), 0)], [np.zeros(3)], 1.0, 5)
+    with pytest.raises(ValueError, match="0 fault-free, 1 faulty and 1 calibration runs"):
+        tune(Scaled(), [], [FaultyRun("a", np.zeros(3), 0)], [np.zeros(3)], 0.1, 5)
     with pytest.raises(ValueError, match="models has nothing"):
         WindowBank({}, BOX)
