@@ -54,6 +54,13 @@ def _to_copies(app: Any, page: str, source: list[str]) -> None:
         source[0] = re.sub(r"\]\(\.\./(?:notebooks/)?([\w-]+\.(?:md|ipynb))", r"](_copied/\1", source[0])
 
 
+def _keep_bars(_app: Any, _what: str, _name: str, _obj: Any, _options: Any, lines: list[str]) -> None:
+    """Bars in a docstring are absolute values, where reStructuredText would see a substitution."""
+    for i, line in enumerate(lines):
+        lines[i] = re.sub(r"``.*?``|\|", lambda found: "\\|" if found[0] == "|" else found[0], line)
+
+
 def setup(app: Any) -> None:
     _copy_pages()
+    app.connect("autodoc-process-docstring", _keep_bars)
     app.connect("source-read", _to_copies)
