@@ -26,7 +26,7 @@ bench: $(VENV)/.dev
 
 # The documentation site, offline; a broken link or reference is an error.
 docs: $(VENV)/.docs
-	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	$(BIN)/python -m sphinx -q -W --keep-going -aE -b html docs docs/_build/html
 	@echo "Open docs/_build/html/index.html in a browser."
 
 lint: $(VENV)/.dev
