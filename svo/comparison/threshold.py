@@ -35,10 +35,6 @@ class ThresholdDetector(ABC):
     def scores(self, setting: Setting, prepared: Any) -> Array:
         """The score at each sample (K,), whatever the level of the setting."""
 
-    def diagnose(self, setting: Setting, prepared: Any, alarm: NDArray[np.bool_]) -> NDArray[np.intp] | None:
-        """The fault named at each sample, -1 for none; None if the detector only detects."""
-        return None
-
     def learn(self, parameters: Mapping[str, float], healthy: Sequence[Any]) -> Mapping[str, Array]:
         return {}
 
@@ -47,6 +43,10 @@ class ThresholdDetector(ABC):
         return max(floor, float(np.max(scores[~np.isnan(scores)], initial=-np.inf)))
 
     def run(self, setting: Setting, prepared: Any, isolate: bool = True) -> Detection:
-        scores = self.scores(setting, prepared)
-        alarm = np.greater(scores, setting.level, where=~np.isnan(scores), out=np.zeros(scores.shape, dtype=bool))
-        return Detection(alarm, self.diagnose(setting, prepared, alarm) if isolate else None)
+        """Alarms alone; a detector that isolates says more."""
+        return Detection(above(self.scores(setting, prepared), setting.level))
+
+
+def above(scores: Array, level: float) -> NDArray[np.bool_]:
+    """Whether each score is above the level; never where it is NaN."""
+    return np.asarray(~np.isnan(scores) & (scores > level))
