@@ -16,10 +16,11 @@ from svo.baselines import GaussianModel
 from svo.comparison.detector import NOBODY, Detection, Detector, Parameter, Setting
 from svo.comparison.residual_detectors import residual_test_detectors
 from svo.comparison.standard import standard_detectors
-from svo.comparison.threshold import ThresholdDetector, above
+from svo.comparison.threshold import ThresholdDetector
 from svo.comparison.window_bank import WindowBank
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.residual_tests.interface import above
 
 Array = NDArray[np.float64]
 HORIZONS = (5, 10)  # steps in the windows of the set-valued observers

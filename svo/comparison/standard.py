@@ -13,8 +13,9 @@ from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, fault_
 from svo.baselines.multiple_model import MultipleModelFilter
 from svo.baselines.parity import ParitySpace
 from svo.comparison.detector import NOBODY, Detection, Parameter, Setting
-from svo.comparison.threshold import ThresholdDetector, above
+from svo.comparison.threshold import ThresholdDetector
 from svo.log import Log
+from svo.residual_tests.interface import above
 
 Array = NDArray[np.float64]
 PROCESS_NOISE = Parameter(1e-2, 1e2, logarithmic=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from svo.comparison.detector import Detection, Kind, Parameter, Setting
 from svo.log import Log
+from svo.residual_tests.interface import above
 
 Array = NDArray[np.float64]
 
@@ -45,8 +46,3 @@ class ThresholdDetector(ABC):
     def run(self, setting: Setting, prepared: Any, isolate: bool = True) -> Detection:
         """Alarms alone; a detector that isolates says more."""
         return Detection(above(self.scores(setting, prepared), setting.level))
-
-
-def above(scores: Array, level: float) -> NDArray[np.bool_]:
-    """Whether each score is above the level; never where it is NaN."""
-    return np.asarray(~np.isnan(scores) & (scores > level))
