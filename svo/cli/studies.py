@@ -100,7 +100,7 @@ def study(
         )
         StudyFolder(out).check(configuration, resume)
         if isinstance(the_plant, LearnsDetectors):
-            _study_detectors(the_plant, configuration, out, workers, resume, as_json)
+            _study_detectors(the_plant, configuration, out, workers, scheduler, resume, as_json)
             return
         announce(PREPARING)
         warm_up(the_plant, configuration.noise[0])
@@ -158,13 +158,21 @@ def simulate(
 
 
 def _study_detectors(
-    the_plant: LearnsDetectors, configuration: StudyConfiguration, out: Path, workers: int, resume: bool, as_json: bool
+    the_plant: LearnsDetectors,
+    configuration: StudyConfiguration,
+    out: Path,
+    workers: int,
+    scheduler: str | None,
+    resume: bool,
+    as_json: bool,
 ) -> None:
     from svo.interval.study import publish, run_detection_study
     from svo.progress import progress
 
     with progress("Runs") as update:
-        folder = run_detection_study(configuration, out, workers=workers, resume=resume, progress=update)
+        folder = run_detection_study(
+            configuration, out, workers=workers, scheduler=scheduler, resume=resume, progress=update
+        )
     announce("Writing summary, pictures and report")
     found = publish(folder, the_plant)
     if as_json:
