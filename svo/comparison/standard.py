@@ -50,18 +50,11 @@ class KalmanChiSquare(ThresholdDetector):
 
 
 @dataclass(frozen=True)
-class MultipleModels(ThresholdDetector):
-    """Interacting multiple models; the score is the log odds of a fault, the isolated fault the one that has 95 %."""
+class StatedFaults(ThresholdDetector):
+    """What the detectors share that know the plant with each fault at one size."""
 
     model: GaussianModel
     stated: Mapping[str, GaussianModel]
-    name: str = "Kalman bank, IMM"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {
-            "process_noise": PROCESS_NOISE,
-            "switching": Parameter(1e-6, 1e-2, logarithmic=True),
-        }
-    )
 
     @property
     def faults(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -69,6 +62,19 @@ class MultipleModels(ThresholdDetector):
 
     def prepare(self, log: Log) -> Evaluated:
         return Evaluated(self.model.samples(log), tuple(model.samples(log) for model in self.stated.values()))
+
+
+@dataclass(frozen=True)
+class MultipleModels(StatedFaults):
+    """Interacting multiple models; the score is the log odds of a fault, the isolated fault the one that has 95 %."""
+
+    name: str = "Kalman bank, IMM"
+    parameters: Mapping[str, Parameter] = field(
+        default_factory=lambda: {
+            "process_noise": PROCESS_NOISE,
+            "switching": Parameter(1e-6, 1e-2, logarithmic=True),
+        }
+    )
 
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return self._filter(setting).over([prepared.nominal, *prepared.faulty]).log_odds
@@ -86,20 +92,11 @@ class MultipleModels(ThresholdDetector):
 
 
 @dataclass(frozen=True)
-class ParityTest(ThresholdDetector):
+class ParityTest(StatedFaults):
     """Parity space; a fault is isolated if it alone brings the parity vector below the threshold."""
 
-    model: GaussianModel
-    stated: Mapping[str, GaussianModel]
     name: str = "parity space"
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"order": Parameter(1, 6, integer=True)})
-
-    @property
-    def faults(self) -> tuple[str, ...]:  # type: ignore[override]
-        return tuple(self.stated)
-
-    def prepare(self, log: Log) -> Evaluated:
-        return Evaluated(self.model.samples(log), tuple(model.samples(log) for model in self.stated.values()))
 
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return self._space(setting).over(prepared.nominal).squares
@@ -118,25 +115,16 @@ class ParityTest(ThresholdDetector):
 
 
 @dataclass(frozen=True)
-class UnknownInputBank(ThresholdDetector):
+class UnknownInputBank(StatedFaults):
     """One unknown-input observer a fault, blind to it; a fault is isolated if its observer alone stays quiet.
 
     Detection is by the observer without unknown inputs, the Kalman filter.
     """
 
-    model: GaussianModel
-    stated: Mapping[str, GaussianModel]
     name: str = "unknown-input bank"
     parameters: Mapping[str, Parameter] = field(
         default_factory=lambda: {"process_noise": PROCESS_NOISE, "samples": WINDOW}
     )
-
-    @property
-    def faults(self) -> tuple[str, ...]:  # type: ignore[override]
-        return tuple(self.stated)
-
-    def prepare(self, log: Log) -> Evaluated:
-        return Evaluated(self.model.samples(log), tuple(model.samples(log) for model in self.stated.values()))
 
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return window_sums(self._filter(setting).over(prepared.nominal).squares, setting.parameters["samples"])
