@@ -118,6 +118,35 @@ def study(
 
 
 @app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study, finished or still running.")],
+) -> None:
+    """Write summary.csv, pictures and report.html of a study from the runs that it has so far.
+
+    \b
+    Example:
+      svo report results
+    """
+    with one_line_errors():
+        _need_study_extra()
+        from svo.interval.study import LearnsDetectors
+        from svo.interval.study import publish as publish_detectors
+        from svo.plant import load_plant
+        from svo.study.publish import publish
+        from svo.study.store import StudyFolder
+
+        study = StudyFolder(folder)
+        the_plant = load_plant(study.identity()["configuration"]["plant"])
+        if not any(study.parts.glob("run-*.parquet")):
+            raise ValueError(f"{folder} holds no finished run yet; its report needs one")
+        if isinstance(the_plant, LearnsDetectors):
+            publish_detectors(study, the_plant)
+        else:
+            publish(study, the_plant)
+        typer.echo(f"Report: {folder / 'report.html'}")
+
+
+@app.command()
 def simulate(
     plant: PlantName,
     out: Annotated[Path, typer.Option(metavar="LOG.csv", help="CSV file to write.")],
