@@ -27,6 +27,7 @@ from benchmarks._window_runs import HORIZON, SETTLE, TURN, Sample, Times, drive,
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
+from svo.observers.window import WindowObserver
 from svo.observers.window_step import WindowStep
 
 HIGHS_SAMPLES, CVXPY_SAMPLES = 300, 60
@@ -48,10 +49,16 @@ class Recording:
     answers: list[Floats | None]
     slack: Floats
 
+    def scaled(self, model: UncertainModel) -> tuple[ScaledSamples, list[tuple[Floats, Floats]], Floats, Floats]:
+        """Samples and arrival boxes about the centre of the last box, in units of its half-widths; both besides."""
+        centre = np.mean(self.boxes[-1], axis=0)
+        unit = 0.5 * (self.boxes[-1][1] - self.boxes[-1][0])
+        samples = ScaledSamples.of(model, self.log, self.slack, centre, unit)
+        return samples, [((low - centre) / unit, (high - centre) / unit) for low, high in self.boxes], centre, unit
 
-def record(model: UncertainModel, log: Log, schedule: str) -> Recording:
-    """Run the observer once and keep what the other solvers need to solve the same windows."""
-    observer = observer_of(model, schedule=schedule)
+
+def record(observer: WindowObserver, log: Log) -> Recording:
+    """Run a fresh observer once and keep what the other solvers need to solve the same windows."""
     sample, arrays, size = drive(observer, log), observer._arrays, observer._size
     queries, boxes, answers, slack = [], [], [], []
     new = arrays["new_upper"], arrays["new_lower"]
@@ -85,16 +92,13 @@ class Contest:
 
 def compete(model: UncertainModel, log: Log, schedule: str) -> Contest:
     """All methods in turns on the same windows."""
-    recording = record(model, log, schedule)
-    centre = np.mean(recording.boxes[-1], axis=0)
-    unit = 0.5 * (recording.boxes[-1][1] - recording.boxes[-1][0])
-    samples = ScaledSamples.of(model, log, recording.slack, centre, unit)
-    boxes = [((low - centre) / unit, (high - centre) / unit) for low, high in recording.boxes]
+    recording = record(observer_of(model, schedule=schedule), log)
+    samples, boxes, centre, unit = recording.scaled(model)
     methods = {
         "ours": (drive(observer_of(model, schedule=schedule), log), 1),
-        "HiGHS, warm": (_highs(samples, recording, boxes, PRIMAL, rebuild=False), 1),
-        "HiGHS, warm, default options": (_highs(samples, recording, boxes, DEFAULT, rebuild=False), 1),
-        "HiGHS, rebuilt": (_highs(samples, recording, boxes, DUAL, rebuild=True), 1),
+        "HiGHS, warm": (highs(samples, recording, boxes, PRIMAL, rebuild=False), 1),
+        "HiGHS, warm, default options": (highs(samples, recording, boxes, DEFAULT, rebuild=False), 1),
+        "HiGHS, rebuilt": (highs(samples, recording, boxes, DUAL, rebuild=True), 1),
         # one sample in 5, so that every place in a block of 4 is met equally often
         "cvxpy + Clarabel": (_cvxpy(samples, recording, boxes), HIGHS_SAMPLES // CVXPY_SAMPLES),
     }
@@ -112,13 +116,14 @@ def compete(model: UncertainModel, log: Log, schedule: str) -> Contest:
     return contest
 
 
-def _highs(
+def highs(
     samples: ScaledSamples,
     recording: Recording,
     boxes: list[tuple[Floats, Floats]],
     options: Options,
     rebuild: bool,
 ) -> Sample:
+    """A function that solves the recorded programs of sample k by HiGHS; to be called in order."""
     window = HighsWindow(samples, recording.steps, *boxes[0], options, rebuild)
 
     def sample(k: int) -> Floats:

@@ -2,9 +2,9 @@
 
 Run with ``python -m benchmarks.growth``. CPU time of a step, boxes not read, all methods on the same logs in one run:
 
-horizon          a random linear plant of 4 states: the window observer, the paper's method (`PolytopeObserver`, 60
-                 facets), and one emptiness program a sample over the same window by HiGHS, rebuilt. (HiGHS warm and
-                 cvxpy on the same programs: ``python -m benchmarks.window_observer``.)
+horizon          a random linear plant of 4 states: the window observer; the same programs over the same windows by
+                 HiGHS, warm and rebuilt, and by cvxpy with Clarabel (compiled before, up to N = 20, five samples); the
+                 paper's method (`PolytopeObserver`, 60 facets)
 uncertainties    q of rank one in the state equation: window, zonotope and polytope observer; a hull over the vertices
                  of Delta in all steps would need 2^(q N) images
 memory           resident memory of a window observer over a long log (``--samples``)
@@ -15,7 +15,6 @@ What a number of states costs is in ``python -m benchmarks.set_representations``
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from time import process_time_ns
 from typing import Any
 
@@ -24,27 +23,27 @@ import numpy as np
 from rich.progress import track
 
 from benchmarks._observers import OBSERVERS, arguments, console, linear_plant, save, table, window
+from benchmarks._window_contest import highs, record
+from benchmarks._window_references import DUAL, PRIMAL, CvxpyWindow
+from benchmarks._window_runs import Times
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.log import Log
-from svo.observers.fallback import is_feasible
 
 SEED, SETTLE, SAMPLES = 20_261_128, 60, 160
 HORIZONS, COUNTS = (1, 2, 5, 10, 20, 50), (0, 1, 2, 3, 4, 5, 6)
 PAPER_HORIZON, PAPER_COUNT = 5, 3  # the largest for which the explicit sets are run
+CVXPY_HORIZON, CVXPY_SAMPLES = 20, range(SETTLE + 3, SAMPLES, 20)  # a problem a size of window: compiling takes long
 LONGEST = 4.0  # seconds of CPU time that one method gets for a log
 
 
-def cost(observer: Any, log: Log, extra: Callable[[Any], object] | None = None) -> float:
-    """Mean CPU microseconds of a step; of ``extra`` instead, if given, after each step."""
+def cost(observer: Any, log: Log) -> float:
+    """Mean CPU microseconds of a step."""
     times: list[float] = []
     first = process_time_ns()
     for k in range(len(log)):
         begun = process_time_ns()
         step = observer.update(log.y[k]) if k == 0 else observer.step(None, log.y[k])
-        if extra is not None:
-            begun = process_time_ns()
-            extra(observer)
         times.append(1e-3 * (process_time_ns() - begun))
         assert step.verdict != "falsified"
         if 1e-9 * (process_time_ns() - first) > LONGEST:
@@ -52,10 +51,25 @@ def cost(observer: Any, log: Log, extra: Callable[[Any], object] | None = None) 
     return float(np.mean(times[min(SETTLE, len(times) // 2) :]))
 
 
-def highs_rebuilt(observer: WindowObserver) -> object:
-    """The emptiness program of the observer's present window, built and solved by HiGHS."""
-    w = observer._arrays
-    return is_feasible(w["G"], w["lower"], w["upper"])
+def general_solvers(model: UncertainModel, box: HPolytope, log: Log, N: int) -> dict[str, float]:
+    """Mean CPU microseconds of a sample's programs, as the window observer of N steps solved them, by other solvers."""
+    recording = record(window(N)(model, box), log)
+    samples, boxes, _, _ = recording.scaled(model)
+    result = {}
+    for name, options, rebuild in (("HiGHS, warm", PRIMAL, False), ("HiGHS, rebuilt", DUAL, True)):
+        solve, times = highs(samples, recording, boxes, options, rebuild), Times()
+        for k in range(len(log)):
+            times.measure(solve, k)
+        result[name] = float(times.microseconds("cpu", range(SETTLE, len(log))).mean())
+    if N <= CVXPY_HORIZON:
+        times = Times()
+        for k in CVXPY_SAMPLES:
+            query = recording.queries[k]
+            problem = CvxpyWindow(samples, query.time - query.base, query.programs, query.target - query.base)
+            problem.solve(query, *boxes[k])  # compiles it
+            times.measure(lambda k, q=query, p=problem: p.solve(q, *boxes[k]), k)  # type: ignore[misc]
+        result["cvxpy + Clarabel"] = float(times.microseconds("cpu").mean())
+    return result
 
 
 def over_horizons(rng: np.random.Generator) -> dict[str, dict[int, float]]:
@@ -63,13 +77,13 @@ def over_horizons(rng: np.random.Generator) -> dict[str, dict[int, float]]:
     model = linear_plant(rng, 4)
     log = model.simulate(np.zeros(4), np.zeros((SAMPLES, 0)), rng)
     box = HPolytope.box(-np.ones(4), np.ones(4))
-    result: dict[str, dict[int, float]] = {"window observer": {}, "HiGHS, rebuilt, emptiness only": {}, "paper": {}}
+    result: dict[str, dict[int, float]] = {}
     for N in track(HORIZONS, "horizon", console=console, transient=True):
-        result["window observer"][N] = cost(window(N)(model, box), log)
-        result["HiGHS, rebuilt, emptiness only"][N] = cost(window(N)(model, box), log, highs_rebuilt)
+        costs = {"window observer": cost(window(N)(model, box), log)} | general_solvers(model, box, log, N)
         if N <= PAPER_HORIZON:
-            result["paper"][N] = cost(OBSERVERS["polytope"](model, box, N), log)
-    result["paper's method, 60 facets"] = result.pop("paper")
+            costs["paper's method, 60 facets"] = cost(OBSERVERS["polytope"](model, box, N), log)
+        for name, value in costs.items():
+            result.setdefault(name, {})[N] = value
     return result
 
 
@@ -150,6 +164,9 @@ def main(given: list[str] | None = None) -> None:
     axes[2].set_xlabel("samples")
     axes[2].set_ylabel("resident memory [MB]")
     times = panels["steps N"]["window observer"]
+    rivals = {name: other for name, other in panels["steps N"].items() if name != "window observer"}
+    ratios = [[name, *(f"{t[N] / times[N]:.1f}" if N in t else "-" for N in HORIZONS)] for name, t in rivals.items()]
+    table("Cost in units of the window observer's, by number of steps N", ("method", *map(str, HORIZONS)), ratios)
     slope = np.polyfit(np.log([5, 10, 20, 50]), np.log([times[N] for N in (5, 10, 20, 50)]), 1)[0]
     console.print(f"window observer: N^{slope:.2f} from 5 to 50 (aim 1.3)")
     middle = len(used) // 2

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.isolation.bank import Bank, Sample, by_name, check_counts, falsified_and_undecided
+from svo.isolation.bank import Bank, Sample, falsified_and_undecided
+from svo.isolation.bank_checks import by_name, check_counts
 from svo.isolation.bank_state import set_arrays, set_of
 from svo.isolation.global_logic import GlobalLogic
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState

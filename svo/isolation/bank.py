@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
 from inspect import signature
 from time import perf_counter
 from types import MappingProxyType
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import restore_state, saved_state
-from svo.isolation.logic import NOMINAL, IsolationLogic, LogicState
+from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
 from svo.observers.step import Observer, Step
@@ -64,7 +65,7 @@ class Bank(ABC):
         self.observers: Mapping[str, Observer] = MappingProxyType(dict(observers))
         self._logic = logic
         self._untimed = tuple(n for n, o in observers.items() if "deadline" not in signature(o.step).parameters)
-        _check_observers(self.observers, same_states)
+        check_observers(self.observers, same_states)
         self._forget()
 
     # -- samples -----------------------------------------------------------------------------------
@@ -79,7 +80,7 @@ class Bank(ABC):
         """
         if self._sample is not None:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        steps = self._ask(lambda observer: observer.update(y0, u=u, schedule=schedule))
+        steps = self._ask(lambda name: self._running[name].update(y0, u=u, schedule=schedule))
         return self._conclude(0, steps, Sample(None, y0, u, schedule))
 
     def step(
@@ -111,10 +112,66 @@ class Bank(ABC):
         if self._sample is None:
             raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
         if deadline is None:
-            steps = self._ask(lambda observer: observer.step(u, y, u_next=u_next, schedule=schedule))
+            steps = self._ask(lambda name: self._running[name].step(u, y, u_next=u_next, schedule=schedule))
         else:
             steps = self._timed_steps(u, y, u_next, schedule, deadline)
         return self._conclude(self._sample + 1, steps, Sample(u, y, u_next, schedule))
+
+    def late_update(self, y: ArrayLike, sample: int) -> Verdict:
+        """A measurement that arrives after its sample; the verdict is about the newest one, and replaces the last.
+
+        Every running observer whose window holds the sample takes it. One that started after it, or whose window has
+        left it behind, goes on without: its set is still sound. What is falsified is falsified at the newest sample.
+
+        Parameters
+        ----------
+        y : (ny,) array
+            Measured at ``sample``; NaN for the sensors that did not arrive now.
+        sample : int
+            As `Verdict.sample` counts.
+
+        Raises
+        ------
+        TypeError
+            If a running observer has no ``late_update``.
+        ValueError
+            Before the first measurement, for a sample in the window of no running observer, or what an observer
+            refuses, as in `step`.
+        """
+        if self._sample is None:
+            raise ValueError("late_update was called before the first measurement; call update(y0) first")
+        taken = self._own_samples(sample, self._sample)
+        if not any(own is not None for own in taken.values()):
+            raise ValueError(f"sample is {sample!r}; expected one in the window of a running observer")
+        last = {name: observer.window[1] for name, observer in self._running.items()}  # type: ignore[attr-defined]
+
+        def late(name: str) -> Step:
+            own, observer = taken[name], self._running[name]
+            given = (self._nothing(), last[name]) if own is None else (y, own)
+            answer: Step = observer.late_update(*given)  # type: ignore[attr-defined]
+            return answer
+
+        # Who takes it comes first: what is wrong with it shows before any observer has changed.
+        answers = self._ask(late, sorted(self._running, key=lambda name: taken[name] is None))
+        steps = {name: answers[name] for name in self._running}
+        falsified, _ = falsified_and_undecided(steps)
+        state = replace(self._state, restart=())
+        if falsified:  # only those count: the others had their answer at this sample
+            state = self._logic.advance(state, self._sample, falsified, undecided=(*self.names, GLOBAL))
+        return self._apply(self._sample, state, steps, falsified, self._latest)
+
+    def _own_samples(self, sample: int, newest: int) -> dict[str, int | None]:
+        """The number that each running observer gives to a sample of the bank; None if its window does not hold it."""
+        if isinstance(sample, bool) or not isinstance(sample, int | np.integer):
+            raise ValueError(f"sample is {sample!r}; expected the number of a sample")
+        found: dict[str, int | None] = {}
+        for name, observer in self._running.items():
+            if not hasattr(observer, "late_update"):
+                raise TypeError(f"observer {name!r} ({type(observer).__name__}) takes no measurements that come late")
+            first, last = observer.window  # type: ignore[attr-defined]
+            own = sample - newest + last
+            found[name] = int(own) if first <= own <= last else None
+        return found
 
     def state_dict(self) -> dict[str, NDArray[Any]]:
         """Everything that the next samples depend on, as named arrays without objects (for ``numpy.savez``).
@@ -210,23 +267,23 @@ class Bank(ABC):
             )
         left = iter(range(len(self._running), 0, -1))
 
-        def timed(observer: Observer) -> Step:
+        def timed(name: str) -> Step:
             share = max(0.0, end - perf_counter()) / next(left)
-            return observer.step(u, y, u_next=u_next, schedule=schedule, deadline=share)
+            return self._running[name].step(u, y, u_next=u_next, schedule=schedule, deadline=share)
 
         return self._ask(timed)
 
-    def _ask(self, call: Callable[[Observer], Step]) -> dict[str, Step]:
-        """The answers of the running observers, in their order."""
+    def _ask(self, call: Callable[[str], Step], names: Iterable[str] | None = None) -> dict[str, Step]:
+        """The answers of the running observers, in their order or in that of the names."""
         if self._refused_by is not None:
             raise ValueError(
                 f"observer {self._refused_by!r} refused a sample that others had already seen; call reset(set), or "
                 "load_state_dict(state) of the sample before"
             )
         steps: dict[str, Step] = {}
-        for name, observer in self._running.items():
+        for name in self._running if names is None else names:
             try:
-                steps[name] = call(observer)
+                steps[name] = call(name)
             except Exception as error:
                 self._refused_by = name if steps else None
                 if type(error) is ValueError:
@@ -261,6 +318,12 @@ class Bank(ABC):
     def _conclude(self, k: int, steps: dict[str, Step], now: Sample) -> Verdict:
         falsified, undecided = falsified_and_undecided(steps)
         state = self._logic.advance(self._state, k, falsified, undecided)
+        return self._apply(k, state, steps, falsified, now)
+
+    def _apply(
+        self, k: int, state: LogicState, steps: dict[str, Step], falsified: Collection[str], now: Sample
+    ) -> Verdict:
+        """Do what the logic asks for at sample k."""
         state = self._begin_again(state, k, steps, falsified, now)
         if state is not self._state:
             self._adopt(state)
@@ -274,7 +337,12 @@ class Bank(ABC):
         return observer.update(self._nothing() if y is None else y, u=at.u_next, schedule=at.schedule)
 
     def _predict_from(self, name: str, set: HPolytope, now: Sample) -> Step:
-        """Start from the sample before, leaving out the measurement that nothing explains."""
+        """Start from the set of the sample before, leaving out the measurement that nothing explains.
+
+        One that came late leaves the set of its verdict, which is of the present sample.
+        """
+        if now is self._latest:
+            return self._start_from(name, set, now)
         self._start_from(name, set, self._latest)
         return self.observers[name].step(now.u, self._nothing(), u_next=now.u_next, schedule=now.schedule)
 
@@ -293,24 +361,6 @@ class Bank(ABC):
                 raise ValueError(f"log.{name} has shape {shape}; expected (samples, {wanted}), as the models have")
 
 
-def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[str, ...]) -> dict[str, Observer]:
-    """All models' observers by name, the nominal one first; refuses bad names and the reserved ones."""
-    taken = " or ".join(repr(name) for name in reserved)
-    if not isinstance(faults, Mapping):
-        raise TypeError(f"faults is a {type(faults).__name__}; expected a mapping of fault names to observers")
-    for name in faults:
-        if not isinstance(name, str) or not name.strip() or name in reserved:
-            raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")
-    return {NOMINAL: nominal, **faults}
-
-
-def check_counts(debounce: int, recovery: int | None, timeout: int | None) -> None:
-    """Refuse counts of samples below one."""
-    _check_count("debounce", debounce)
-    _check_count("recovery", recovery, optional=True)
-    _check_count("timeout", timeout, optional=True)
-
-
 def falsified_and_undecided(steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
     """Names of the falsified and of the undecided observers."""
     falsified: list[str] = []
@@ -325,24 +375,3 @@ def _is_proved(name: str, step: Step) -> bool:
     if step.verdict == "falsified" and step.certificate is None:
         raise ValueError(f"observer {name!r} answered 'falsified' without a certificate; expected one, or 'undecided'")
     return step.verdict == "falsified"
-
-
-def _check_count(name: str, value: int | None, optional: bool = False) -> None:
-    if value is None and optional:
-        return
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1{', or None' if optional else ''}")
-
-
-def _check_observers(observers: Mapping[str, Observer], same_states: bool) -> None:
-    owners: dict[int, str] = {}
-    for name, observer in observers.items():
-        if id(observer) in owners:
-            raise ValueError(f"{name!r} and {owners[id(observer)]!r} are the same observer; give each name its own")
-        owners[id(observer)] = name
-    nominal = observers[NOMINAL].model
-    for name, observer in observers.items():
-        for attribute in ("n_inputs", "n_outputs", "Ts", *(("n_states",) if same_states else ())):
-            found, wanted = getattr(observer.model, attribute), getattr(nominal, attribute)
-            if found != wanted:
-                raise ValueError(f"the model of {name!r} has {attribute} = {found}; expected {wanted}, as nominal has")

@@ -32,6 +32,7 @@ from svo.observers.window_step import WindowRecord, WindowStep
 Array = NDArray[np.float64]
 _GROWING_START = 16
 _LARGEST_BASIS = 128
+_LARGEST_GROWING_BASIS = 256
 _PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
 _ENTRY_ERRORS = {
     kernel.BAD_INPUT: "u is {u}; expected finite numbers",
@@ -302,6 +303,11 @@ class WindowObserver:
         return perf_counter() - begun
 
     @property
+    def stopped(self) -> int:
+        """Programs so far that ended at the limit of pivots or of the basis: their bounds hold, yet could be less."""
+        return int(self._arrays["clock"][kernel.STOPS])
+
+    @property
     def directions(self) -> Array:
         """Directions (nt, n) in which the arrival set and `WindowStep.set` are bounded: the axes, then the template."""
         return self._arrays["T"].copy()
@@ -360,10 +366,11 @@ class WindowObserver:
         nv, nr = nw + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
         na = max(len(self._template), len(self._initial.rows))
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
+        largest = _LARGEST_BASIS if self.horizon is not None else _LARGEST_GROWING_BASIS
         self._size = kernel.Sizes(
             n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
             nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps, block=self._block,
-            K=min(rows, columns, _LARGEST_BASIS) + 2, late=int(self._late),
+            K=min(rows, columns, largest) + 2, late=int(self._late),
         )  # fmt: skip
         w = self._arrays = kernel.allocate(self._size)
         w["T"][:n] = np.eye(n)

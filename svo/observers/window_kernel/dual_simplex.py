@@ -19,6 +19,8 @@ from svo.observers.window_kernel.memory import (
     FAST,
     FEASIBILITY,
     GAP,
+    LARGE_JITTER,
+    LONG,
     OPTIMAL,
     PIVOTS,
     PROGRAMS,
@@ -324,31 +326,61 @@ def _farkas_gap(w):
 
 
 @njit(error_model="numpy")
+def _largest_cost(w):
+    scale = 0.0
+    for j in range(w.true_cost.shape[0]):
+        scale = max(scale, abs(w.true_cost[j]))
+    return scale
+
+
+@njit(error_model="numpy")
+def _disturb_cost(w, factor):
+    """The true cost, disturbed by so many times the jitter."""
+    scale = _largest_cost(w)
+    for j in range(w.true_cost.shape[0]):
+        w.cost[j] = w.true_cost[j] + factor * scale * w.jitter[j]
+
+
+@njit(error_model="numpy")
+def _optimise_patiently(w, q, limit):
+    """`_optimise`; what takes long goes on with a cost that is disturbed far more, and from there to the end.
+
+    In a long window the cost of most variables is next to nothing, so most steps are short: large disturbances save
+    three pivots of four. Any basis being dual feasible, the way back takes no phase of its own.
+    """
+    _disturb_cost(w, 1.0)
+    begun = w.clock[PIVOTS]
+    outcome = _optimise(w, q, min(limit, LONG))
+    if outcome != STOPPED or limit <= LONG:
+        return outcome
+    _disturb_cost(w, LARGE_JITTER)
+    outcome = _optimise(w, q, limit - LONG)
+    if outcome != EMPTY:
+        _disturb_cost(w, 1.0)
+        outcome = _optimise(w, q, max(limit - (w.clock[PIVOTS] - begun), 0))
+    return outcome
+
+
+@njit(error_model="numpy")
 def maximise(w, size, q, limit):
     """Outer bound of max cost'z over the window, from the basis of direction q. Returns (outcome, bound)."""
-    cost, jitter = w.cost, w.jitter
     prepare(w, size, q)
-    scale = 0.0
-    for j in range(cost.shape[0]):
-        scale = max(scale, abs(cost[j]))
-    for j in range(cost.shape[0]):
-        w.true_cost[j] = cost[j]
-        cost[j] += scale * jitter[j]
-    outcome = _optimise(w, q, limit)
+    copy(w.true_cost, w.cost)
+    outcome = _optimise_patiently(w, q, limit)
     if outcome == EMPTY and _farkas_gap(w) >= 0.0:
         w.clock[REFACTORED] += 1
         w.k[q] = eliminate(w, q, w.k[q], w.k[q], 1e-6)
-        outcome = _optimise(w, q, limit)
+        outcome = _optimise_patiently(w, q, limit)
         if outcome == EMPTY and _farkas_gap(w) >= 0.0:
             cold(w, q)
-            outcome = _optimise(w, q, limit)
+            outcome = _optimise_patiently(w, q, limit)
             if outcome == EMPTY and _farkas_gap(w) >= 0.0:
                 outcome = STOPPED
     if outcome == STOPPED:
         w.clock[STOPS] += 1
-    copy(cost, w.true_cost)
+    copy(w.cost, w.true_cost)
     value, rounding = _outer_value(w, q, w.k[q])
-    if outcome == OPTIMAL and value - _primal_value(w) > GAP * scale:
+    if outcome == OPTIMAL and value - _primal_value(w) > GAP * _largest_cost(w):
         # Breakpoints that the ratio test passed over as small, and multipliers that have drifted, cost the bound
         # something where rows are long and their bounds wide: the same basis, factored and priced anew.
         w.clock[REFACTORED] += 1

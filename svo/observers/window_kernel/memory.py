@@ -23,7 +23,9 @@ FEASIBILITY = 1e-9  # violation of a scaled row or variable that counts as none
 GAP = 1e-9  # between bound and optimum, as a share of the largest cost, that is not worth another factorisation
 SMALL_PIVOT = 1e-6
 REFACTOR = 60  # pivots between refactorisations
-PIVOT_LIMIT = 2000
+LONG = 250  # pivots after which a program goes on with a cost that is disturbed by
+LARGE_JITTER = 1e7  # times the jitter, 1e-4 of the largest cost
+PIVOT_LIMIT = 10_000
 
 AT_LOWER, AT_UPPER, BASIC, AT_CENTRE = 0, 1, 2, 3
 OPTIMAL, EMPTY, STOPPED = 0, 1, 2
@@ -45,8 +47,10 @@ FLOATS = {
     # rows as they entered, scaled: coefficients of the own state, sum of |own variables|, of |terms in the bounds|,
     # bounds before the state
     "row_x": "Rn", "row_v": "R", "row_c": "R", "raw_lower": "R", "raw_upper": "R", "scale": "R",
-    # newest state over z; per sample: state at z = 0, bound of |x|, bound of the rounding error
-    "psi": "nZ", "phi": "Sn", "mag": "Sn", "err": "Sn",
+    # newest state over z; per sample: state at z = 0, bound of |x|, of the terms that it was computed from, of what
+    # v moves in it, and of the rounding error; that error in its frame, and what carries it to the next
+    "psi": "nZ", "phi": "Sn", "mag": "Sn", "terms": "Sn", "from_v": "Sn", "err": "Sn", "rho": "Sn", "frame": "Snn",
+    "carry": "Snn",
     # per sample: A, the drift at the centres and its magnitude, the columns [E, channels] scaled
     "A": "Snn", "drift": "Sn", "drift_mag": "Sn", "inputs": "Snv",
     # centres and half-widths of v and of the arrival state

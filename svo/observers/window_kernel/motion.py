@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from svo.observers.window_kernel.memory import BASE, PENDING, TIME, UNIT
+from svo.observers.window_kernel.rounding import carry_error, error_of, turn_frame
 from svo.observers.window_kernel.rows import arrival_rows, clear_row, midpoint, place_row
 from svo.observers.window_kernel.short_rows import copy
 
@@ -43,6 +44,7 @@ def _respond(w, size, k):
     n = size.n
     s, t = k % (size.N + 1), (k + 1) % (size.N + 1)
     gamma = 2.0 * UNIT * (n + size.nu + size.nw + size.nq + 8)
+    fresh = np.empty(n)
     for i in range(n):
         value, magnitude, error = w.drift[s, i], w.drift_mag[s, i], 0.0
         for j in range(n):
@@ -52,7 +54,22 @@ def _respond(w, size, k):
             error += abs(a) * w.err[s, j]
         w.phi[t, i] = value
         w.mag[t, i] = magnitude
-        w.err[t, i] = (error + gamma * magnitude) * (1.0 + 1e-12)
+        w.terms[t, i] = magnitude
+        fresh[i] = gamma * magnitude
+        w.err[t, i] = (error + fresh[i]) * (1.0 + 1e-12)
+    carry_error(w.carry[s], w.frame[t], w.rho[s], fresh, w.rho[t])
+    for i in range(n):
+        error = error_of(w.frame[t], w.rho[t], i)
+        if error < w.err[t, i]:
+            w.err[t, i] = error
+
+
+@njit(error_model="numpy")
+def _limit_magnitude(w, t, i, spread):
+    """|x_i| by its spread over the box, which does not grow as |A|^k does."""
+    reach = (abs(w.phi[t, i]) + w.err[t, i] + spread) * (1.0 + 1e-12)
+    if reach < w.mag[t, i]:
+        w.mag[t, i] = reach
 
 
 @njit(error_model="numpy")
@@ -60,7 +77,9 @@ def advance(w, size, k):
     """The newest state moves from k to k + 1."""
     n, nv = size.n, size.nw + size.nq
     s, v = k % (size.N + 1), k % (size.N + size.late)
+    t = (k + 1) % (size.N + 1)
     _load_transition(w, size, k)
+    turn_frame(w.A[s], w.frame[s], w.frame[t], w.carry[s])
     _respond(w, size, k)
     first = n + v * nv
     A, psi = w.A[s], w.psi
@@ -76,12 +95,14 @@ def advance(w, size, k):
     for i in range(n):
         for j in range(nv):
             psi[i, first + j] += w.inputs[s, i, j]
-    t = (k + 1) % (size.N + 1)
-    for i in range(n):  # the spread over the box, which does not grow as |A|^k does
-        reach = abs(w.phi[t, i]) + w.err[t, i]
-        for j in range(psi.shape[1]):
-            reach += abs(psi[i, j])
-        w.mag[t, i] = min(w.mag[t, i], reach * (1.0 + 1e-12))
+    for i in range(n):
+        spread = 0.0
+        for j in range(n, psi.shape[1]):
+            spread += abs(psi[i, j])
+        w.from_v[t, i] = spread * (1.0 + 1e-12)
+        for j in range(n):
+            spread += abs(psi[i, j])
+        _limit_magnitude(w, t, i, spread)
 
 
 @njit(error_model="numpy")
@@ -92,7 +113,9 @@ def anchor(w, size):
         w.xc[j], w.xr[j] = midpoint(w.h_lower[j], w.h_upper[j])
         w.phi[s, j] = w.xc[j]
         w.mag[s, j] = abs(w.xc[j]) + w.xr[j]
+        w.terms[s, j] = w.mag[s, j]
         w.err[s, j] = 0.0
+        w.rho[s, j] = 0.0
 
 
 @njit(error_model="numpy")
@@ -158,8 +181,13 @@ def _rebuild(w, size):
                     for r in range(n):
                         value += A[s, i, r] * response[r, j]
                     moved[i, j] = value
+            t = (k + 1) % (size.N + 1)
             for i in range(n):
                 copy(response[i], moved[i])
+                spread = w.from_v[t, i]
+                for j in range(n):
+                    spread += abs(response[i, j])
+                _limit_magnitude(w, t, i, spread)
     for i in range(n):
         for j in range(n):
             psi[i, j] = response[i, j]

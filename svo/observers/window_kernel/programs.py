@@ -40,10 +40,12 @@ def _arrival_cost(w, size, i, sign):
     for r in range(n):
         costate[r] = sign * w.T[i, r]
         constant += costate[r] * w.phi[t, r]
-        rounding += abs(costate[r]) * (w.err[t, r] + 2.0 * UNIT * (size.block * (n + 8)) * w.mag[t, r])
+        rounding += abs(costate[r]) * w.err[t, r]
     fill(w.cost, 0.0)
     for k in range(target - 1, base - 1, -1):
         s, first = k % (size.N + 1), n + (k % (size.N + size.late)) * nv
+        for r in range(n):
+            rounding += 2.0 * UNIT * (n + 8) * abs(costate[r]) * w.terms[(k + 1) % (size.N + 1), r]
         A, inputs = w.A[s], w.inputs[s]
         for j in range(nv):
             for r in range(n):

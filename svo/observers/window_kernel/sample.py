@@ -187,6 +187,7 @@ def _compile_initialise(sources):
         anchor(w, size)
         for j in range(size.n):
             w.psi[j, j] = w.xr[j]
+            w.frame[0, j, j] = 1.0
         for r in range(rows.shape[0]):
             copy(w.row_x[r], rows[r])
             w.raw_lower[r] = rows_lower[r]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polytopes import HPolytope
-from svo import UncertainModel, Uncertainty, WindowObserver
+from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver
 from svo.alarms import Alarm, verify_alarms, write_alarms
+from svo.detect import alarms_of
+from svo.log import Log
 from svo.observers.sign_split import SplitCertificate
+from svo.verification import verify_chains
 from tests.svo.observers import oracle
 from tests.svo.observers.random_plants import random_plant
 from tests.svo.observers.test_against_full_information import (
@@ -133,6 +137,46 @@ def test_a_split_alarm_on_disk_is_verified_again(tmp_path: Path) -> None:
     write_alarms(path, [Alarm("spread", 2, 2.0, split_alarm(), {})])
     (check,) = verify_alarms(path)
     assert check.ok
+
+
+class SplitPlant:
+    """As much of a plant as `verify_chains` asks for: its bank splits by signs."""
+
+    def scheduler(self) -> Callable[..., None]:
+        return lambda *_: None
+
+    def bank(self, noise: str) -> ArchitectureI:
+        spread = Uncertainty(A=[[0.0, 0.0], [1.0, 0.0]], bounds=(-1.0, 1.0))
+        model = UncertainModel([[1.0, 0.0], [0.0, 0.0]], None, np.eye(2), n=[0.2, 0.01], uncertainties=[spread])
+        return ArchitectureI(WindowObserver(model, HPolytope.box([-1, -1], [1, 1]), 4, sign_split=ENOUGH), {})
+
+
+@pytest.mark.parametrize(("last", "sample"), [([0.0, np.nan], None), ([3.0, np.nan], 2)])
+def test_a_chain_is_proven_over_hulls_or_says_that_it_would_need_the_split(
+    last: list[float], sample: int | None, tmp_path: Path
+) -> None:
+    y = np.array([[np.nan, np.nan], [np.nan, 0.9], last])
+    log, plant = Log(time=np.arange(3.0), u=np.zeros((3, 0)), y=y), SplitPlant()
+    alarms = alarms_of(plant.bank("").run(log), log, {"plant": "split", "noise": ""})
+    write_alarms(tmp_path / "alarms.jsonl", alarms)
+    (check,) = verify_chains(tmp_path / "alarms.jsonl", log, plant)  # type: ignore[arg-type]
+    assert check.ok == (sample is not None)
+    words = "proven from the first sample" if check.ok else "over convex hulls, not split by signs as the plant's is"
+    assert words in check.reason
+
+
+def test_a_step_with_a_deadline_keeps_the_hull() -> None:
+    case = gentle_case(3)
+    boxes = []
+    for cells in (0, ENOUGH):
+        observer = case.observer(4, sign_split=cells)
+        observer.update(case.log.y[0], case.log.u[0])
+        for k in range(1, SAMPLES):
+            step = observer.step(case.log.u[k - 1], case.log.y[k], case.log.u[k], deadline=10.0)
+            assert step.verdict == "consistent"
+        observer.sign_split = 0  # the box is no part of the step
+        boxes.append(step.box)
+    np.testing.assert_allclose(boxes[0], boxes[1], rtol=0.0, atol=1e-12)
 
 
 def test_a_bad_number_of_cells_is_named() -> None:

@@ -1,0 +1,50 @@
+"""What a bank asks of its observers, their names and its options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from svo.isolation.logic import NOMINAL
+from svo.observers.step import Observer
+
+
+def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[str, ...]) -> dict[str, Observer]:
+    """All models' observers by name, the nominal one first; refuses bad names and the reserved ones."""
+    taken = " or ".join(repr(name) for name in reserved)
+    if not isinstance(faults, Mapping):
+        raise TypeError(f"faults is a {type(faults).__name__}; expected a mapping of fault names to observers")
+    for name in faults:
+        if not isinstance(name, str) or not name.strip() or name in reserved:
+            raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")
+    return {NOMINAL: nominal, **faults}
+
+
+def check_counts(debounce: int, recovery: int | None, timeout: int | None) -> None:
+    """Refuse counts of samples below one."""
+    _check_count("debounce", debounce)
+    _check_count("recovery", recovery, optional=True)
+    _check_count("timeout", timeout, optional=True)
+
+
+def _check_count(name: str, value: int | None, optional: bool = False) -> None:
+    if value is None and optional:
+        return
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1{', or None' if optional else ''}")
+
+
+def check_observers(observers: Mapping[str, Observer], same_states: bool) -> None:
+    """Refuse an observer that stands twice, and models that differ in what a bank needs to agree."""
+    owners: dict[int, str] = {}
+    for name, observer in observers.items():
+        if id(observer) in owners:
+            raise ValueError(f"{name!r} and {owners[id(observer)]!r} are the same observer; give each name its own")
+        owners[id(observer)] = name
+    nominal = observers[NOMINAL].model
+    for name, observer in observers.items():
+        for attribute in ("n_inputs", "n_outputs", "Ts", *(("n_states",) if same_states else ())):
+            found, wanted = getattr(observer.model, attribute), getattr(nominal, attribute)
+            if found != wanted:
+                raise ValueError(f"the model of {name!r} has {attribute} = {found}; expected {wanted}, as nominal has")
