@@ -198,8 +198,9 @@ class Program:
         solved = np.array([name == OPTIMAL for name in status])
         upper, lower = np.split(np.where(solved[:, None], points, np.nan), 2)
         widths = np.diag(upper) - np.diag(lower)
-        rest = np.maximum(self.rhs - self.centre @ self.AT, _NOISE * self.size)
-        steepest = (np.abs(self.AT) / rest).max(axis=1)
+        rest = self.rhs - self.centre @ self.AT
+        open_ = rest > _NOISE * self.size  # a row that holds with equality says nothing about a width
+        steepest = (np.abs(self.AT[:, open_]) / rest[open_]).max(axis=1, initial=0.0)
         widths = np.where(np.isnan(widths) & (steepest > 0.0), 1.0 / np.maximum(steepest, 1e-30), widths)
         size = np.abs(np.where(solved[:, None], points, 0.0)).max(axis=0, initial=float(np.abs(self.centre).max()))
         known = widths > _NOISE * size
