@@ -6,7 +6,7 @@ OUT    ?= demo
 STUDY  := $(OUT)/eclipse
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
 
-.PHONY: demo test test-slow bench docs lint clean
+.PHONY: demo test test-slow test-browser test-packaging bench docs lint clean
 
 # The isolation-time study of the Eclipse with both noise sets, then a check of every alarm's proof.
 demo: $(VENV)/.study
@@ -21,12 +21,20 @@ test: lint
 test-slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 -m slow
 
+# The report of a study in headless Chromium or Chrome; skipped, with the reason, where there is none.
+test-browser: $(VENV)/.dev
+	$(BIN)/python -m pytest -m browser -rs
+
+# Wheel and source archive: built, installed into an empty environment, used from outside this folder.
+test-packaging: $(VENV)/.dev
+	$(BIN)/python -m pytest -m packaging -rs
+
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks
 
 # The documentation site, offline; a broken link or reference is an error.
 docs: $(VENV)/.docs
-	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	$(BIN)/python -m sphinx -q -W --keep-going -aE -b html docs docs/_build/html
 	@echo "Open docs/_build/html/index.html in a browser."
 
 lint: $(VENV)/.dev

@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 Distribution = Literal["uniform", "gaussian"]
 
 DELAY = 2
-MEASUREMENTS = ("abx", "aby", "abz", "p", "q", "r", "x", "y", "z", "vbx", "vby", "vbz", "phi", "theta", "psi")
 GAUSSIAN_SIGMAS = 5.0  # within which a Gaussian sample is taken to lie: 6e-7 of them do not
 
 
@@ -29,6 +28,8 @@ def _per_group(acceleration: float, rate: float, position: float, velocity: floa
 @dataclass(frozen=True)
 class SensorErrors:
     """What IMU and INS add to the truth, one entry a measurement.
+
+    The 15 measurements are abx, aby, abz, p, q, r, x, y, z, vbx, vby, vbz, phi, theta, psi.
 
     Parameters
     ----------

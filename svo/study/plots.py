@@ -144,8 +144,8 @@ def plot_sets(
     true = exemplar.x[snapshot.sample, list(dims)]
     artists += ax.plot(*true, "x", color="#111111", markersize=7, markeredgewidth=1.8, zorder=5)
     ax.margins(0.08)
-    ax.set_xlabel(_label(states[dims[0]]))
-    ax.set_ylabel(_label(states[dims[1]]))
+    ax.set_xlabel(column_label(states[dims[0]]))
+    ax.set_ylabel(column_label(states[dims[1]]))
     return artists
 
 
@@ -165,7 +165,7 @@ def plot_bounds(
     artists += ax.plot(time, exemplar.x[:, state], color="#111111", linewidth=1.1, label="true state")
     artists.append(_fault_line(ax))
     ax.set_xlabel("time after the fault [s]")
-    ax.set_ylabel(_label(states[state]))
+    ax.set_ylabel(column_label(states[state]))
     return artists
 
 
@@ -252,7 +252,7 @@ def _circles(ax: Axes) -> list[Artist]:
     return artists
 
 
-def _label(column: Column) -> str:
+def column_label(column: Column) -> str:
     """Name and unit; a unit that the column's name ends with is not said twice."""
     name = column.name.removesuffix("_" + column.unit.replace("/", "_"))
     return f"{name.replace('_', ' ')} [{column.unit}]"

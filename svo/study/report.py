@@ -137,7 +137,7 @@ def html_table(table: tables.TextTable) -> str:
         for row in table.rows
     )
     return (
-        f'<div class="scroll"><table><caption>{escape(table.title)}</caption>\n'
+        f'<div class="scroll"><table><caption><span>{escape(table.title)}</span></caption>\n'
         f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>"
     )
 

@@ -51,7 +51,7 @@ def test_plants_are_listed_with_what_they_have(registered_tank: str) -> None:
     assert every["eclipse"]["Ts"] == 0.01
 
 
-@pytest.mark.parametrize("command", ["plants", "study", "simulate", "detect", "watch", "verify"])
+@pytest.mark.parametrize("command", ["plants", "study", "report", "simulate", "detect", "watch", "verify"])
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = svo(command, "--help")
     assert result.exit_code == 0
@@ -278,3 +278,21 @@ def test_a_bound_that_is_not_proven_fails_the_chain(log: Path, tmp_path: Path, m
     assert result.exit_code == 1
     reasons = [check["reason"] for check in json.loads(result.stdout)]
     assert all("bounds are not proven, first: arrival bound 0" in reason for reason in reasons)
+
+
+def test_a_report_is_written_from_the_runs_so_far(registered_tank: str, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    svo("study", "tank", "--runs", "2", "--workers", "1", "--noise", "calm", "--out", out)
+    written = (out / "report.html").read_text(encoding="utf-8")
+    (out / "report.html").unlink()
+    assert "Report:" in svo("report", out).stdout
+    assert (out / "report.html").read_text(encoding="utf-8") == written
+    for part in (out / "runs.parquet").iterdir():
+        if part.stem > "run-000002":  # as in a study that is still running
+            part.unlink()
+    assert svo("report", out).exit_code == 0
+    assert "3 runs" in (out / "report.html").read_text(encoding="utf-8")
+    for part in (out / "runs.parquet").iterdir():
+        part.unlink()
+    assert "holds no finished run yet" in one_line(svo("report", out))
+    assert "study.json" in one_line(svo("report", tmp_path / "nowhere"))

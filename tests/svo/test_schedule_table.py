@@ -74,3 +74,32 @@ def test_bad_tables_are_named(points: Any, values: Any, message: str) -> None:
 def test_a_schedule_that_is_no_number_is_refused(schedule: float) -> None:
     with pytest.raises(ValueError, match="schedule is"):
         A(schedule)
+
+
+class Doubled:
+    """A function of the schedule with an ``over`` of its own that is not a table."""
+
+    def __init__(self, table: ScheduleTable) -> None:
+        self.table = table
+
+    def __call__(self, schedule: Any) -> np.ndarray:
+        return 2 * self.table(schedule)
+
+    def over(self, schedule: Any) -> np.ndarray:
+        return 2 * self.table.over(schedule)
+
+
+@pytest.mark.parametrize("wrap", [lambda table: table, lambda table: lambda schedule: table(schedule), Doubled])
+def test_many_samples_at_once_are_the_samples_one_by_one(wrap: Any) -> None:
+    schedule = np.concatenate([POINTS, np.linspace(-1.0, 5.0, 41)])
+    one_by_one = np.array([model(wrap).stack(at) for at in schedule])
+    np.testing.assert_allclose(model(wrap).stack_over(schedule), one_by_one, rtol=0, atol=1e-14)
+
+
+def test_a_function_of_many_samples_with_a_wrong_shape_is_named() -> None:
+    class Wrong(Doubled):
+        def over(self, schedule: Any) -> np.ndarray:
+            return super().over(schedule)[:, :1]
+
+    with pytest.raises(ValueError, match=r"A has shape \(1, 2\); expected \(2, 2\) at each sample"):
+        model(lambda table: Wrong(table) if table is A else Doubled(table)).stack_over(POINTS)

@@ -193,3 +193,13 @@ def test_wrong_arguments_are_named(log):
         MultipleModelFilter({"nominal": model})
     with pytest.raises(ValueError, match="call update"):
         InnovationFilter(model).start().step([0.0], log.y[0], schedule=0.0)
+
+
+@pytest.mark.parametrize("model", [plant(), scheduled(), scheduled().replace(n=lambda s: (1 + s**2) * np.ones(3))])
+def test_the_model_along_a_log_is_that_of_each_sample(log, model):
+    gaussian = GaussianModel(model, BOX)
+    samples = gaussian.samples(log)
+    for k in (0, 17, len(log) - 1):
+        one = gaussian.sample(log.u[k], log.schedule_at(k))
+        for name in one._fields:
+            np.testing.assert_allclose(getattr(samples, name)[k], getattr(one, name), rtol=0, atol=1e-14)

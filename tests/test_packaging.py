@@ -1,0 +1,105 @@
+"""Wheel and source archive: built, installed into an empty environment, and used from there (`make test-packaging`)."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.packaging
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ("aircraft", "polytopes", "svo")
+EXAMPLES = ROOT / "docs" / "examples"
+
+TYPED = """
+from polytopes import HPolytope
+from svo import UncertainModel, WindowObserver
+
+model = UncertainModel([[0.9]], [[1.0]], [[1.0]], n=[0.1], Ts=0.1)
+observer = WindowObserver(model, HPolytope.box([-1.0], [1.0]))
+wrong: int = HPolytope.box([-1.0], [1.0]).emptiness().status
+"""
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def archives(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The source archive, and the wheel that is built from it."""
+    out = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--outdir", out, ROOT, cwd=out)
+    return next(out.glob("*.tar.gz")), next(out.glob("*.whl"))
+
+
+@pytest.fixture(scope="module")
+def installed(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Programs of a new environment that has the wheel and what it asks for, and nothing else."""
+    home = tmp_path_factory.mktemp("fresh")
+    venv.create(home / "venv", with_pip=True)
+    programs = home / "venv" / ("Scripts" if sys.platform == "win32" else "bin")
+    run(programs / "python", "-m", "pip", "install", "--quiet", archives[1], cwd=home)
+    return programs
+
+
+def shipped() -> set[str]:
+    """Every file of the packages that the repository keeps."""
+    return set(run("git", "ls-files", *PACKAGES, cwd=ROOT).split())
+
+
+def test_the_wheel_has_every_file_of_the_packages_and_nothing_else(archives: tuple[Path, Path]) -> None:
+    names = {n for n in zipfile.ZipFile(archives[1]).namelist() if ".dist-info/" not in n}
+    assert names == shipped()
+    assert {"svo/study/report.js", "svo/study/report.css", *(f"{p}/py.typed" for p in PACKAGES)} <= names
+
+
+def test_the_source_archive_builds_by_itself(archives: tuple[Path, Path]) -> None:
+    with tarfile.open(archives[0]) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert shipped() | {"README.md", "LICENSE", "pyproject.toml"} <= names
+
+
+def test_the_installed_package_works(installed: Path, tmp_path: Path) -> None:
+    assert "eclipse" in run(installed / "svo", "plants", cwd=tmp_path)
+    code = (
+        "from importlib.resources import files; from polytopes import HPolytope; import svo; "
+        "assert files('svo.study').joinpath('report.js').read_text(); "
+        "print(svo.__file__, HPolytope.empty(2).emptiness().status)"
+    )
+    where, status = run(installed / "python", "-c", code, cwd=tmp_path).split()
+    assert Path(where).is_relative_to(installed.parent)
+    assert status == "empty"
+
+
+def test_the_installed_package_detects_and_proves(installed: Path, tmp_path: Path) -> None:
+    found = run(
+        installed / "svo", "detect", EXAMPLES / "cart.toml", EXAMPLES / "cart.csv", "--out", "found", cwd=tmp_path
+    )
+    assert "Fault isolated at 5 s: sensor." in found
+    assert "2 of 2 alarms proven" in run(installed / "svo", "verify", "found/alarms.jsonl", cwd=tmp_path)
+
+
+def test_what_an_extra_is_needed_for_says_so(installed: Path, tmp_path: Path) -> None:
+    command = [installed / "svo", "study", "eclipse", "--out", "study"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "svo-fdi[study]" in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_types_reach_the_user(installed: Path, tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(TYPED, encoding="utf-8")
+    check = [sys.executable, "-m", "mypy", "--python-executable", str(installed / "python"), "script.py"]
+    done = subprocess.run(check, cwd=tmp_path, capture_output=True, text=True)
+    errors = [line for line in done.stdout.splitlines() if ": error:" in line]
+    assert len(errors) == 1, done.stdout
+    assert errors[0].startswith("script.py:7: error: Incompatible types in assignment")
