@@ -139,7 +139,9 @@ def main(given: list[str] | None = None) -> None:
     parser.add_argument("--samples", type=int, default=20_000, help="of the log for the memory")
     options = parser.parse_args([] if given is None else given)
     rng = np.random.default_rng(SEED)
-    OBSERVERS["window"](linear_plant(rng, 2), HPolytope.box(-np.ones(2), np.ones(2))).warm_up()
+    small = linear_plant(rng, 2)
+    for start in OBSERVERS.values():
+        start(small, HPolytope.box(-np.ones(2), np.ones(2))).warm_up()
     panels = {"steps N": over_horizons(rng), "uncertainties": over_uncertainties(rng)}
     at, used = memory(rng, options.samples)
     figure, axes = plt.subplots(1, 3, figsize=(15, 4.3))
@@ -153,6 +155,8 @@ def main(given: list[str] | None = None) -> None:
         ax.set_ylabel("mean CPU time a sample [us]")
         ax.set_yscale("log")
     axes[0].set_xscale("log")
+    axes[0].set_xticks(HORIZONS, list(map(str, HORIZONS)))
+    axes[0].minorticks_off()
     unit = panels["uncertainties"]["window observer, N = 10"][0]
     vertices = [(q, 2.0 ** (10 * q)) for q in COUNTS if q <= 2]
     costs = [unit * v for _, v in vertices]

@@ -45,6 +45,8 @@ def examine(name: str, samples: int, i: int) -> Counter[str]:
             step = observer.update(y[k], log.u[k]) if k == 0 else observer.step(log.u[k - 1], y[k], log.u[k])
             count["samples"] += 1
             count[step.verdict] += 1
+            if step.verdict == "undecided":
+                count[f"undecided: plant {i}, sample {k}"] += 1
             if step.verdict == "falsified":
                 count[f"falsified: plant {i}, sample {k}"] += 1
                 break

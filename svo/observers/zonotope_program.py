@@ -40,21 +40,23 @@ class ZonotopeProgram:
         self._solver: Any = None
 
     def feasibility(self) -> Feasibility:
-        """A point by least squares, else by the simplex method."""
+        """A point by least squares, else by the simplex method, else by the interior-point method."""
         nothing = np.zeros(self._set.offset.size)
         if self._least_squares_point():
             return Feasibility("nonempty", nothing)
         import highspy
 
         self._open()
-        self._solver.run()
-        status = self._solver.getModelStatus()
-        if status == highspy.HighsModelStatus.kOptimal:
-            return Feasibility("nonempty", nothing)
-        if status == highspy.HighsModelStatus.kInfeasible:
-            _, known, ray = self._solver.getDualRay()
-            if known:
-                return Feasibility("empty", self._scale * np.asarray(ray, dtype=float))
+        for method in ("simplex", "ipm"):  # the simplex method leaves a few programs undecided
+            self._solver.setOptionValue("solver", method)
+            self._solver.run()
+            status = self._solver.getModelStatus()
+            if status == highspy.HighsModelStatus.kOptimal:
+                return Feasibility("nonempty", nothing)
+            if status == highspy.HighsModelStatus.kInfeasible:
+                _, known, ray = self._solver.getDualRay()
+                if known:
+                    return Feasibility("empty", self._scale * np.asarray(ray, dtype=float))
         return Feasibility("undecided", nothing)
 
     def support(self, directions: Array) -> Array:
@@ -79,6 +81,7 @@ class ZonotopeProgram:
             yield from (nothing for _ in costs)
             return
         self._open()
+        self._solver.setOptionValue("solver", "simplex")
         for cost in costs:
             size = np.abs(cost).max(initial=0.0)
             if size == 0.0:

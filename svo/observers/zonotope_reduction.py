@@ -67,11 +67,13 @@ def _without_one_constraint(Z: ConstrainedZonotope) -> ConstrainedZonotope:
     G, A, size = Z.generators, Z.constraints, np.abs(Z.constraints)
     total = size.sum(axis=1)
     inverse = np.divide(1.0, size, out=np.full_like(A, np.inf), where=size > EPS * total[:, None])
-    excess = np.maximum((np.abs(Z.offset) + Z.slack + total)[:, None] * inverse - 2.0, 0.0)
+    is_pair = np.isfinite(inverse)
+    terms = (np.abs(Z.offset) + Z.slack + total)[:, None]
+    excess = np.maximum(terms * np.where(is_pair, inverse, 0.0) - 2.0, 0.0)
     widths = np.abs(G).sum(axis=1) + Z.room
     weight = (np.abs(G) / np.where(widths > 0.0, widths, 1.0)[:, None]).sum(axis=0)
     weight = weight + (size / (total + Z.slack)[:, None]).sum(axis=0)
-    cost = np.where(np.isfinite(excess), excess * weight, np.inf)
+    cost = np.where(is_pair & np.isfinite(excess), excess * weight, np.inf)
     i, j = np.unravel_index(int(np.argmin(cost)), cost.shape)
     if not np.isfinite(cost[i, j]):
         return _take_rows(Z, np.arange(len(Z.offset)) != 0)

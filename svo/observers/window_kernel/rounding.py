@@ -1,7 +1,7 @@
 """How far the rounding of one sample reaches into later states, without the growth of powers of |A|.
 
 The error of the state obeys e(k+1) = A e(k) + delta(k). Bounded entry by entry it grows as |A|^k does, which for a
-stable plant of 20 states can be 1e15 after 25 samples. So it is kept in turned coordinates besides, e = Q r with
+stable plant of 20 states was 6e12 after 29 samples. So it is kept in turned coordinates besides, e = Q r with
 |r| <= rho: the QR factorisation of A Q gives the next Q, and its triangle carries rho (Lohner's method, as in
 Nedialkov, Jackson and Corliss, Applied Mathematics and Computation 105, 1999, section 6). The smaller bound holds.
 """

@@ -10,6 +10,7 @@ from flint import fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.soundness import examine
 from polytopes import HPolytope
 from polytopes.exact import rational, rational_vector
 from svo import ConstrainedZonotopeObserver, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
@@ -182,3 +183,10 @@ def test_a_set_beyond_floats_is_refused() -> None:
     observer.step(None, [np.nan])
     with np.errstate(over="ignore"), pytest.raises(OverflowError, match="no finite bounds"):
         observer.step(None, [np.nan])
+
+
+def test_what_the_simplex_method_leaves_undecided_is_decided() -> None:
+    """At sample 84 of this plant HiGHS' simplex method ends with kUnknown."""
+    count = examine("zonotope", 100, 509)
+    assert count["consistent"] == count["samples"] == 100
+    assert count["exclusions"] == 0
