@@ -49,7 +49,7 @@ class Certificate:
     def gap(self, P: HasRows) -> float:
         """``-(lambda'b + mu'd)`` with multipliers of sum one: how far the rows are from having a common point.
 
-        In the units of b.  A gap of some 1e-16 |b| says that the rows contradict each other only by rounding.
+        In the units of b.  A gap of 1e-16 of the entries of b means that rows contradict each other only by rounding.
         """
         _, bound = combine(P.A, P.b, self.inequality)
         _, value = combine(P.C, P.d, self.equality)

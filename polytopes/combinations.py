@@ -37,13 +37,13 @@ def everything(n: int) -> Table:
 def affine_image(P: Rows, M: Floats, t: Floats) -> Table:
     """``{M x + t : x in P}`` for any matrix M (p, n).
 
-    A well-conditioned square map is inverted; otherwise ``z = M x + t`` is added as equalities and x projected out.
+    A well-conditioned square map of a set with a ball inside is inverted; otherwise ``z = M x + t`` is added as
+    equalities and x projected out, so that rounding neither empties a flat set nor makes it thick.
     """
     p, n = M.shape
-    if p == n and np.linalg.cond(M) < _DIRECT:
-        both = np.asarray(np.linalg.solve(M.T, np.vstack([P.A, P.C]).T).T, dtype=np.float64)
-        A, C = both[: P.b.size], both[P.b.size :]
-        return A, P.b + A @ t, C, P.d + C @ t
+    if p == n and P.d.size == 0 and P.program.fat and np.linalg.cond(M) < _DIRECT:
+        A = np.asarray(np.linalg.solve(M.T, P.A.T).T, dtype=np.float64)
+        return A, P.b + A @ t, np.empty((0, n)), np.empty(0)
     lifted = Rows(
         np.hstack([np.zeros((P.b.size, p)), P.A]),
         P.b,

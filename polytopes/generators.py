@@ -12,8 +12,9 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from polytopes.affine import affine_set
-from polytopes.errors import EmptySetError
+from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.exact import row_to_floats
+from polytopes.hull import normals_of_span
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
 from polytopes.vertices import vertices
@@ -44,7 +45,7 @@ def generators(P: Rows) -> Generators:
     """
     if not known_nonempty(P):
         raise EmptySetError("the empty set has no generators; ask emptiness() first.")
-    size = P.program.size
+    size = float(np.ldexp(1.0, np.frexp(P.program.size)[1]))  # a power of two: what is flat stays flat
     equalities = np.hstack([P.C, -P.d[:, None] / size])
     last = np.append(np.zeros(P.dim), -1.0)
     rays, lines = _cone(np.vstack([np.hstack([P.A, -P.b[:, None] / size]), last, equalities, -equalities]))
@@ -57,12 +58,24 @@ def generators(P: Rows) -> Generators:
 
 
 def rows_of_generators(V: Floats, rays: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Rows A, b, C, d of ``conv(V) + cone(rays)``: the generators of the cone of all rows that hold."""
+    """Rows A, b, C, d of ``conv(V) + cone(rays)``: the generators of the cone of all rows that hold.
+
+    Points and rays within 1e-12 of their spread of a subspace give explicit equalities; the rows are found in as many
+    coordinates, taken as they are, as that subspace has dimensions.
+    """
+    longest = np.abs(rays).max(axis=1, keepdims=True)
+    offsets = V - V.mean(axis=0)
+    directions = rays / np.where(longest > 0.0, longest, 1.0) * (np.abs(offsets).max() or 1.0)
+    C = normals_of_span(np.vstack([offsets, directions]))
+    d = C @ V.mean(axis=0)
+    free = affine_set(C, d).free
     k = len(V)
     holds = np.vstack([np.hstack([V, -np.ones((k, 1))]), np.hstack([rays, np.zeros((len(rays), 1))])])
-    found, equalities = _cone(holds)
+    found, _ = _cone(holds[:, [*free, V.shape[1]]])
     proper = np.abs(found[:, :-1]).max(axis=1, initial=0.0) > _AT_INFINITY * np.abs(found[:, -1])
-    return found[proper, :-1], found[proper, -1], equalities[:, :-1], equalities[:, -1]
+    A = np.zeros((np.count_nonzero(proper), V.shape[1]))
+    A[:, free] = found[proper, :-1]
+    return A, found[proper, -1], C, d
 
 
 def _cone(G: Floats) -> tuple[Floats, Floats]:
@@ -78,7 +91,10 @@ def _cone(G: Floats) -> tuple[Floats, Floats]:
     slicing = -(across[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0)
     rays = np.zeros((0, n))
     if slicing.any():
-        corners = vertices(Rows(across, np.zeros(len(G)), slicing[None], [1.0]))
+        try:
+            corners = vertices(Rows(across, np.zeros(len(G)), slicing[None], [1.0]))
+        except UnboundedError:  # in floats only: two generators whose difference is rounding
+            raise UndecidedError("rounding hides which generators are extreme and which cancel.") from None
         rays = np.zeros((len(corners), n))
         rays[:, null.pivots] = corners
     return rays, lines

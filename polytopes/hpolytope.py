@@ -70,15 +70,14 @@ class HPolytope(Rows):
     def from_vertices(cls, V: ArrayLike, rays: ArrayLike | None = None) -> Self:
         """Convex hull of points (k, n), k >= 1, plus the cone of the rays (r, n) if there are any.
 
-        Qhull, in scaled coordinates.  Without rays, points within 1e-12 of their spread of a subspace give explicit
-        equalities; with rays, points and rays that lie exactly in one.
+        Qhull, in scaled coordinates.  Points and rays within 1e-12 of their spread of a subspace give explicit
+        equalities.
         """
         points = as_array("V", V, 2)
         if 0 in points.shape:
             raise ValueError(f"V has shape {points.shape}; expected one or more points (none: HPolytope.empty).")
-        if rays is not None:
-            return cls(*rows_of_generators(points, as_matrix("rays", rays, points.shape[1])))
-        return cls(*rows_of_points(points))
+        cone = np.empty((0, points.shape[1])) if rays is None else as_matrix("rays", rays, points.shape[1])
+        return cls(*(rows_of_generators(points, cone) if len(cone) else rows_of_points(points)))
 
     @classmethod
     def empty(cls, n: int) -> Self:

@@ -31,8 +31,7 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     offsets = (V - centre) / scale
     sizes, axes = principal_axes(offsets)
     rank = int(np.count_nonzero(sizes > _FLAT * sizes[0]))
-    C = axes[rank:] / scale
-    C /= np.linalg.norm(C, axis=1)[:, None]
+    C = _unit(axes[rank:] / scale)
     d = C @ centre
     if rank == 0:
         return np.empty((0, n)), np.empty(0), np.eye(n), V[0].copy()
@@ -40,9 +39,21 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     rows = found.rows[:, :-1]
     if not found.certain():
         rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(rank))]
-    normals = rows / sizes[:rank] @ axes[:rank] / scale
-    normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+    normals = _unit(rows / sizes[:rank] @ axes[:rank] / scale)
     return normals, (V @ normals.T).max(axis=0), C, d
+
+
+def normals_of_span(directions: Floats) -> Floats:
+    """Unit normals (n - rank, n) of the span of directions (k, n), which may lie 1e-12 of their spread beside it."""
+    both = np.vstack([directions, -directions])
+    scale = _axis_scales(both)
+    sizes, axes = principal_axes(both / scale)
+    return _unit(axes[np.count_nonzero(sizes > _FLAT * sizes[0]) :] / scale)
+
+
+def _unit(rows: Floats) -> Floats:
+    scaled: Floats = rows / np.linalg.norm(rows, axis=1)[:, None]
+    return scaled
 
 
 def _axis_scales(V: Floats) -> Floats:

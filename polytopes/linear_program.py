@@ -122,7 +122,7 @@ class Program:
 
     @cached_property
     def size(self) -> float:
-        """The size that tolerances refer to: the largest scaled |b|, or 1."""
+        """The size that tolerances refer to: the largest entry of the scaled b, or 1."""
         return float(np.abs(self.rhs).max(initial=0.0)) or 1.0
 
     @cached_property
@@ -165,6 +165,11 @@ class Program:
         """Whether the set is so thin (or so nearly empty) that only exact arithmetic can say that it has a point."""
         interior = self.interior
         return self.AT.shape[0] == 0 or not interior.reliable or interior.radius <= _THIN * self.size
+
+    @cached_property
+    def fat(self) -> bool:
+        """Whether a ball fits in, within the affine set, that floats vouch for."""
+        return self.consistent and not self.thin and self.interior.radius > 0.0
 
     @cached_property
     def centre(self) -> Floats:

@@ -57,7 +57,7 @@ def known_nonempty(P: Rows) -> bool:
     UndecidedError
         If that could not be decided.
     """
-    if P.program.consistent and not P.program.thin and P.program.interior.radius > 0.0:
+    if P.program.fat:
         return True
     if P.decided.status == "undecided":
         raise UndecidedError(f"cannot tell whether the set is empty: {P.decided.reason}")

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from polytopes import Certificate, HPolytope
 from svo.log import Log
+from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.polytope_step import MeasuredOutput, PolytopeCertificate
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
 from svo.observers.sign_split import SplitCertificate
+from svo.observers.zonotope_proof import ZonotopeCertificate
 
 Array = NDArray[np.float64]
 
@@ -173,6 +175,31 @@ SPLIT = AlarmKind(
 )
 
 
+# -- constrained-zonotope observers ------------------------------------------------------------------------------
+
+
+def _decode_zonotope(record: Mapping[str, Any]) -> ZonotopeCertificate:
+    return ZonotopeCertificate(
+        arrival=ConstrainedZonotope(**decode_arrays(record["arrival"])),
+        multipliers=decode_array(record["multipliers"]),
+        window=_decode_window(record["window"]),
+    )
+
+
+def _zonotope_difference(c: ZonotopeCertificate, last: int, log: Log) -> str | None:
+    return _window_difference(c.window, last, log)
+
+
+ZONOTOPE = AlarmKind(
+    "constrained zonotope",
+    ZonotopeCertificate,
+    encode_value,
+    _decode_zonotope,
+    lambda _: "the arrival set",
+    _zonotope_difference,
+)
+
+
 # -- polytope observers ------------------------------------------------------------------------------------------
 
 
@@ -209,4 +236,4 @@ POLYTOPE = AlarmKind(
     "polytope", PolytopeCertificate, _encode_polytope, _decode_polytope, _polytope_proves, _polytope_difference
 )
 
-KINDS = (WINDOW, SPLIT, POLYTOPE)
+KINDS = (WINDOW, SPLIT, ZONOTOPE, POLYTOPE)

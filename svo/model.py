@@ -202,6 +202,36 @@ class UncertainModel:
             stack[entry.where] = value
         return stack
 
+    def stack_over(self, schedule: ArrayLike) -> Array:
+        """`stack` at many samples.
+
+        A function of the schedule that has a method ``over`` itself, as `ScheduleTable` has, is asked for all
+        samples at once; others are called once a sample.
+
+        Parameters
+        ----------
+        schedule : (K, ...) array
+            One value a sample.
+
+        Returns
+        -------
+        (K, 1 + n_uncertainties, n + ny, n + nu + 1 + nw) array
+        """
+        values = np.asarray(schedule, dtype=float)
+        if self._table is not None:
+            return self._table.over(values)
+        stacks = np.repeat(self._constant[None], len(values), axis=0)
+        if not all(hasattr(entry.function, "over") for entry in self._scheduled):
+            for k, value in enumerate(values):
+                stacks[k] = self.stack(float(value) if value.ndim == 0 else value)
+            return stacks
+        for entry in self._scheduled:
+            array: Array = np.asarray(entry.function.over(values), dtype=np.float64)  # type: ignore[attr-defined]
+            if array.shape != (len(values), *entry.shape):
+                raise ValueError(self._shape_message(entry.item, entry.name, array.shape[1:]) + " at each sample")
+            stacks[(slice(None), *entry.where)] = array
+        return stacks
+
     def bounds(self, schedule: Any = None) -> tuple[Array, Array, Array]:
         """Disturbance bounds (nw,), (nw,) and noise half-width (ny,) at one sample."""
         if not self._bounds_scheduled:

@@ -62,6 +62,15 @@ class ScheduleTable:
         result += self.values[index]
         return result
 
+    def over(self, schedule: ArrayLike) -> Array:
+        """The array at many values (K,) of the schedule, (K, ...)."""
+        at = np.clip(finite_array("schedule", schedule), self.points[0], self.points[-1])
+        index = np.minimum(np.searchsorted(self.points, at, side="right") - 1, len(self.points) - 2)
+        beyond = (at - self.points[index]).reshape(-1, *[1] * (self.values.ndim - 1))
+        result: Array = self._slopes[index] * beyond + self.values[index]
+        result[at == self.points[-1]] = self.values[-1]  # without rounding, as one value alone gives it
+        return result
+
     def has_points_of(self, other: ScheduleTable) -> bool:
         """Whether both are tabulated over the same points."""
         return self._knots == other._knots

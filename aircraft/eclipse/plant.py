@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
 from svo.plant import Column, Columns, Distribution, Reference, StatedFault
+from svo.schedule_table import ScheduleTable
 
 if TYPE_CHECKING:
     from svo.comparison.detector import Detector
@@ -189,8 +190,8 @@ class Eclipse:
         return AirspeedFilter(self.Ts, DESIGN_AIRSPEED)
 
 
-def _shifted(offset: Callable[[Any], Array], shift: Array) -> Callable[[Any], Array]:
-    return lambda schedule: offset(schedule) + shift
+def _shifted(offset: ScheduleTable, shift: Array) -> ScheduleTable:
+    return ScheduleTable.of(lambda c: c + shift, offset)
 
 
 def eclipse(reference: str = "absolute") -> Eclipse:

@@ -83,7 +83,7 @@ class ScheduledBlocks:
 
     def over(self, schedule: ArrayLike) -> dict[str, Array]:
         """Blocks at many airspeeds (K,): name to (K, ...) array."""
-        rows = np.array([self._flat(airspeed) for airspeed in np.asarray(schedule)])
+        rows = self._flat.over(schedule)
         return {name: rows[:, where].reshape(len(rows), *shape) for name, where, shape in self._layout}
 
     def block(self, name: str) -> ScheduleTable:

@@ -15,7 +15,7 @@ INITIAL_RADIUS = 0.002  # rad
 
 @dataclass(frozen=True)
 class ServoGains:
-    """gc = 1 - gamma(u, y) T without force (19), gr = min(k1 + k2 |u - xc|, k3, 0.95 gamma T), h = 1.
+    """``gc = 1 - gamma(u, y) T`` without force (19), ``gr = min(k1 + k2 |u - xc|, k3, 0.95 gamma T)``, ``h = 1``.
 
     The last term keeps the stability condition (17) where a large distance makes gamma T smaller than k3.
 

@@ -6,7 +6,7 @@ surface-to-air missile deck at Mach 2, except where a comment says "own choice".
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +88,7 @@ class Airframe:
     gravity: float = GRAVITY
 
     def __post_init__(self) -> None:
-        values = np.array(astuple(self), dtype=float)
+        values = self.packed()
         if not np.isfinite(values).all():
             raise ValueError(f"{fields(self)[int(np.argmin(np.isfinite(values)))].name} is not a finite number")
         for name in ("mass", "roll_inertia", "pitch_inertia", "reference_area", "reference_length", "scale_height"):
@@ -101,7 +101,7 @@ class Airframe:
 
     def packed(self) -> Array:
         """Everything that the compiled functions need, in the order of the fields."""
-        return np.array(astuple(self), dtype=float)
+        return np.array([getattr(self, field.name) for field in fields(self)], dtype=float)
 
     def perturbed(self, relative: float, rng: np.random.Generator) -> Airframe:
         """Another airframe: each force coefficient times 1 + e, the e independent and uniform in [-relative, relative].

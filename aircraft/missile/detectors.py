@@ -13,13 +13,14 @@ from aircraft.missile.models import measurement_of
 from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
 from polytopes import HPolytope
 from svo.baselines import GaussianModel
-from svo.comparison.detector import NOBODY, Detector, Parameter, Setting
+from svo.comparison.detector import NOBODY, Detection, Detector, Parameter, Setting
 from svo.comparison.residual_detectors import residual_test_detectors
 from svo.comparison.standard import standard_detectors
 from svo.comparison.threshold import ThresholdDetector
 from svo.comparison.window_bank import WindowBank
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.residual_tests.interface import above
 
 Array = NDArray[np.float64]
 HORIZONS = (5, 10)  # steps in the windows of the set-valued observers
@@ -55,11 +56,15 @@ class Redundancy(ThresholdDetector):
     def scores(self, setting: Setting, prepared: Array) -> Array:
         return np.max(self._each(setting, prepared), axis=1)
 
-    def diagnose(self, setting: Setting, prepared: Array, alarm: NDArray[np.bool_]) -> NDArray[np.intp]:
-        above = self._each(setting, prepared) > setting.level
+    def run(self, setting: Setting, prepared: Array, isolate: bool = True) -> Detection:
+        each = self._each(setting, prepared)
+        alarm = above(np.max(each, axis=1), setting.level)
         signature = signature_matrix(self.airframe, TABLE_1)
-        matches = np.column_stack([(above == signature[:, INPUTS.index(j)]).all(axis=1) for j in ACTUATORS])
-        return np.where(alarm & (matches.sum(axis=1) == 1), np.argmax(matches, axis=1), NOBODY)
+        matches = np.column_stack(
+            [((each > setting.level) == signature[:, INPUTS.index(j)]).all(axis=1) for j in ACTUATORS]
+        )
+        named = np.where(alarm & (matches.sum(axis=1) == 1), np.argmax(matches, axis=1), NOBODY)
+        return Detection(alarm, named if isolate else None)
 
     def _each(self, setting: Setting, prepared: Array) -> Array:
         means = moving_mean(prepared, int(setting.parameters["samples"]))

@@ -140,30 +140,29 @@ class Embedding:
         gravity = self.airframe.gravity * np.array([rotation(angles)[2] for angles in y[:, 12:15]])
         return {"A": A, "h": h, "G": balance.G, "gravity": gravity}
 
+    def blocks_over(self, schedule: ArrayLike) -> dict[str, Array]:
+        """The model's blocks A, B, a, D and c at many samples, (K, ...) each."""
+        parts = self.over(schedule)
+        D, c = np.zeros((len(parts["A"]), len(OUTPUTS), N_INPUTS)), np.zeros((len(parts["A"]), len(OUTPUTS)))
+        D[:, 3:, : len(INPUTS)], c[:, 3:] = parts["G"], parts["h"]
+        a = self.Ts * (parts["h"] + parts["gravity"])
+        return {"A": parts["A"], "B": self.Ts * D[:, 3:], "a": a, "D": D, "c": c}
+
     def at(self, schedule: Any) -> dict[str, Array]:
-        """The model's blocks at one sample; shared between the observers of a bank, which all ask for the same one."""
+        """The same at one sample; shared between the observers of a bank, which all ask for the same one."""
         values = np.asarray(schedule, dtype=float)
         remembered, blocks = self._last[0]
         key = values.tobytes()
         if key != remembered:
             if values.shape != TYPICAL.shape or not np.isfinite(values).all():
                 raise ValueError(f"schedule is {values}; expected {TYPICAL.size} finite measurements")
-            parts = {name: part[0] for name, part in self.over(values).items()}
-            D, c = np.zeros((len(OUTPUTS), N_INPUTS)), np.zeros(len(OUTPUTS))
-            D[3:, : len(INPUTS)], c[3:] = parts["G"], parts["h"]
-            blocks = {
-                "A": parts["A"],
-                "B": self.Ts * D[3:],
-                "a": self.Ts * (parts["h"] + parts["gravity"]),
-                "D": D,
-                "c": c,
-            }
+            blocks = {name: block[0] for name, block in self.blocks_over(values).items()}
             self._last[0] = (key, blocks)  # one assignment: safe where observers run in threads
         return blocks
 
-    def block(self, name: str) -> Callable[[Any], Array]:
+    def block(self, name: str) -> Block:
         """One block as a function of the schedule."""
-        return lambda schedule: self.at(schedule)[name]
+        return Block(self, (name,))
 
     def model(self, errors: SensorErrors, mismatch: MismatchBounds, shared: bool = True) -> UncertainModel:
         """The model without faults, for one set of sensor errors and of mismatch bounds.
@@ -190,3 +189,30 @@ class Embedding:
             names=NAMES,
             schedule=TYPICAL,
         )
+
+
+@dataclass(frozen=True)
+class Block:
+    """A function of blocks of the embedding, at one schedule or, by ``over``, at many.
+
+    Parameters
+    ----------
+    embedding : Embedding
+    names : tuple of str
+        The blocks that it is a function of.
+    change : function of arrays
+        Of the blocks, alike with and without samples in front.
+    """
+
+    embedding: Embedding
+    names: tuple[str, ...]
+    change: Callable[..., Array] = np.asarray
+
+    def __call__(self, schedule: Any) -> Array:
+        blocks = self.embedding.at(schedule)
+        return self.change(*(blocks[name] for name in self.names))
+
+    def over(self, schedule: ArrayLike) -> Array:
+        """At many schedules (K, 12): (K, ...)."""
+        blocks = self.embedding.blocks_over(schedule)
+        return self.change(*(blocks[name] for name in self.names))

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
-from aircraft.missile.models import OUTPUTS, SCHEDULING, Embedding, MeasuredSchedule, read_bounds, schedule_of
+from aircraft.missile.models import OUTPUTS, SCHEDULING, Block, Embedding, MeasuredSchedule, read_bounds, schedule_of
 from aircraft.missile.scenarios import DM, DN, ETA, TS, Fault, Flights, locked, noise_set, thrust_loss
 from polytopes import HPolytope
 from svo.faults import ActuatorFault, SensorFault, Step
@@ -130,12 +130,12 @@ class Missile:
     def stated_faults(self, noise: str, shared: bool = True) -> dict[str, StatedFault]:
         """The missile with each fault at the size of its flights, the fins locked where they are on average at 30 s."""
         models = {name: self._healthy(noise, name, shared) for name in self.faults}
-        size = 1.0 - THRUST_LOSS
+        size, embedding = 1.0 - THRUST_LOSS, self._embedding
         changed = {
-            "propulsion": _with_input(models["propulsion"], ETA, size, 0.0),
-            "pitch_fin": _with_input(models["pitch_fin"], DM, 0.0, LOCKED_PITCH),
-            "yaw_fin": _with_input(models["yaw_fin"], DN, 0.0, LOCKED_YAW),
-            "accelerometer": _with_output(models["accelerometer"], ABZ_OUTPUT, ACCELEROMETER_BIAS),
+            "propulsion": _with_input(models["propulsion"], embedding, ETA, size, 0.0),
+            "pitch_fin": _with_input(models["pitch_fin"], embedding, DM, 0.0, LOCKED_PITCH),
+            "yaw_fin": _with_input(models["yaw_fin"], embedding, DN, 0.0, LOCKED_YAW),
+            "accelerometer": _with_output(models["accelerometer"], embedding, ABZ_OUTPUT, ACCELEROMETER_BIAS),
         }
         return {name: StatedFault(FAULTS[name], model) for name, model in changed.items()}
 
@@ -209,29 +209,32 @@ def _observed(name: str) -> ActuatorFault | SensorFault:
     return replace(fault, magnitude=LARGEST_LOSS) if fault.where == ETA else fault
 
 
-def _with_input(model: UncertainModel, channel: int, gain: float, offset: float) -> UncertainModel:
-    """The model in which an input is achieved as gain u + offset."""
+def _with_input(
+    model: UncertainModel, embedding: Embedding, channel: int, gain: float, offset: float
+) -> UncertainModel:
+    """The model of an embedding in which an input is achieved as gain u + offset."""
     factor = np.ones(model.n_inputs)
     factor[channel] = gain
 
-    def scaled(block: str) -> Callable[[Any], Array]:
-        return lambda schedule: getattr(model, block)(schedule) * factor
+    def scaled(block: Array) -> Array:
+        return block * factor
 
-    def shifted(offset_block: str, block: str) -> Callable[[Any], Array]:
-        return lambda schedule: (
-            getattr(model, offset_block)(schedule) + getattr(model, block)(schedule)[:, channel] * offset
-        )
+    def shifted(constant: Array, block: Array) -> Array:
+        return constant + offset * block[..., channel]
 
-    return model.replace(B=scaled("B"), D=scaled("D"), a=shifted("a", "B"), c=shifted("c", "D"))
+    return model.replace(
+        B=Block(embedding, ("B",), scaled),
+        D=Block(embedding, ("D",), scaled),
+        a=Block(embedding, ("a", "B"), shifted),
+        c=Block(embedding, ("c", "D"), shifted),
+    )
 
 
-def _with_output(model: UncertainModel, channel: int, offset: float) -> UncertainModel:
-    """The model in which a sensor reads ``offset`` too much."""
+def _with_output(model: UncertainModel, embedding: Embedding, channel: int, offset: float) -> UncertainModel:
+    """The model of an embedding in which a sensor reads ``offset`` too much."""
     bias = np.zeros(model.n_outputs)
     bias[channel] = offset
-    healthy = model.c
-    assert callable(healthy)
-    return model.replace(c=lambda schedule: np.asarray(healthy(schedule)) + bias)
+    return model.replace(c=Block(embedding, ("c",), lambda c: c + bias))
 
 
 def _check(fault: str, profile: str) -> None:

@@ -300,7 +300,7 @@ def start(AT: Matrix, b: Vector, x0: Vector, x: Vector, s: Vector, W: Index, Q: 
 
 @njit
 def scale_of(b: Vector) -> float:
-    """Size that tolerances refer to: the largest |b| (1 for a cone)."""
+    """Size that tolerances refer to: the largest entry of b (1 for a cone)."""
     largest = 0.0
     for i in range(b.shape[0]):
         largest = max(largest, abs(b[i]))

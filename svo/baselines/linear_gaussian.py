@@ -83,21 +83,8 @@ class GaussianModel:
 
     def sample(self, u: Array, schedule: Any) -> Sample:
         """The model at one sample, driven by u (nu,)."""
-        layout = self.model.layout
-        total = self._stack(schedule)
-        lower, upper, noise = self.model.bounds(schedule)
-        E = total[layout.block("E")]
-        state, output = total[: layout.n], total[layout.n :]
-        known = slice(layout.n, layout.n + layout.nu)
-        variance = VARIANCE_OF_BOUND * ((upper - lower) / 2) ** 2
-        return Sample(
-            A=state[:, : layout.n],
-            f=state[:, known] @ u + state[:, layout.n + layout.nu] + E @ ((lower + upper) / 2),
-            Q=(E * variance) @ E.T,
-            C=output[:, : layout.n],
-            g=output[:, known] @ u + output[:, layout.n + layout.nu],
-            R=np.diag(VARIANCE_OF_BOUND * np.asarray(noise) ** 2),
-        )
+        bounds = tuple(bound[None] for bound in self.model.bounds(schedule))
+        return Sample(*(part[0] for part in self._over(u[None], self.model.stack(schedule)[None], bounds)))
 
     def samples(self, log: Log) -> GaussianSamples:
         """The model along a log.
@@ -110,16 +97,35 @@ class GaussianModel:
         wanted = (self.model.n_inputs, self.model.n_outputs)
         if (log.u.shape[1], log.y.shape[1]) != wanted:
             raise ValueError(f"log has {log.u.shape[1]} inputs and {log.y.shape[1]} outputs; expected {wanted}")
-        each = [self.sample(log.u[k], log.schedule_at(k)) for k in range(len(log))]
-        A, f, Q, C, g, R = (np.array([getattr(sample, name) for sample in each]) for name in Sample._fields)
-        return GaussianSamples(A, f, Q, C, g, R, log.y)
+        each = [self.model.bounds(log.schedule_at(k)) for k in range(len(log))]
+        bounds = tuple(np.array(bound) for bound in zip(*each, strict=True))
+        return GaussianSamples(*self._over(log.u, self._stacks(log), bounds), log.y)
 
-    def _stack(self, schedule: Any) -> Array:
-        stack = self.model.stack(schedule)
-        total = stack[0]
-        for item, uncertainty in zip(stack[1:], self.model.uncertainties, strict=True):
-            total = total + (uncertainty.bounds[0] + uncertainty.bounds[1]) / 2 * item
-        return total
+    def _stacks(self, log: Log) -> Array:
+        if log.schedule is not None:
+            return self.model.stack_over(log.schedule)
+        stack = self.model.stack(None)
+        return np.broadcast_to(stack, (len(log), *stack.shape))
+
+    def _over(self, u: Array, stacks: Array, bounds: tuple[Array, ...]) -> Sample:
+        """All arrays of a `Sample` with K in front, from inputs (K, nu), stacks of the model and its bounds."""
+        layout = self.model.layout
+        middle = [sum(uncertainty.bounds) / 2 for uncertainty in self.model.uncertainties]
+        total = np.einsum("i,kirc->krc", np.array([1.0, *middle]), stacks)
+        lower, upper, noise = bounds
+        state, output = total[:, : layout.n], total[:, layout.n :]
+        known, constant = slice(layout.n, layout.n + layout.nu), layout.n + layout.nu
+        E = total[(slice(None), *layout.block("E"))]
+        spread = E * (VARIANCE_OF_BOUND * ((upper - lower) / 2) ** 2)[:, None]
+        driven = np.einsum("kij,kj->ki", E, (lower + upper) / 2)
+        return Sample(
+            A=np.ascontiguousarray(state[:, :, : layout.n]),
+            f=np.einsum("kij,kj->ki", state[:, :, known], u) + state[:, :, constant] + driven,
+            Q=spread @ E.transpose(0, 2, 1),
+            C=np.ascontiguousarray(output[:, :, : layout.n]),
+            g=np.einsum("kij,kj->ki", output[:, :, known], u) + output[:, :, constant],
+            R=VARIANCE_OF_BOUND * noise[:, :, None] ** 2 * np.eye(layout.ny),
+        )
 
     def _at(self, schedule: Any, name: str) -> Array:
         return np.asarray(self.model.stack(schedule)[(slice(None), *self.model.layout.block(name))])

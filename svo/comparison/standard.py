@@ -12,9 +12,10 @@ from svo.baselines.kalman import InnovationFilter
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, fault_effect
 from svo.baselines.multiple_model import MultipleModelFilter
 from svo.baselines.parity import ParitySpace
-from svo.comparison.detector import NOBODY, Parameter, Setting
+from svo.comparison.detector import NOBODY, Detection, Parameter, Setting
 from svo.comparison.threshold import ThresholdDetector
 from svo.log import Log
+from svo.residual_tests.interface import above
 
 Array = NDArray[np.float64]
 PROCESS_NOISE = Parameter(1e-2, 1e2, logarithmic=True)
@@ -72,12 +73,12 @@ class MultipleModels(ThresholdDetector):
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return self._filter(setting).over([prepared.nominal, *prepared.faulty]).log_odds
 
-    def diagnose(self, setting: Setting, prepared: Evaluated, alarm: NDArray[np.bool_]) -> NDArray[np.intp]:
-        faults = self._filter(setting).over([prepared.nominal, *prepared.faulty]).posterior[:, 1:]
-        likeliest = np.argmax(faults, axis=1)
+    def run(self, setting: Setting, prepared: Evaluated, isolate: bool = True) -> Detection:
+        found = self._filter(setting).over([prepared.nominal, *prepared.faulty])
+        alarm, faults = above(found.log_odds, setting.level), found.posterior[:, 1:]
         total = faults.sum(axis=1)
-        sure = faults.max(axis=1) >= CONFIDENT * total
-        return np.where(alarm & sure & (total > 0), likeliest, NOBODY)
+        sure = alarm & (total > 0) & (faults.max(axis=1) >= CONFIDENT * total)
+        return Detection(alarm, np.where(sure, np.argmax(faults, axis=1), NOBODY) if isolate else None)
 
     def _filter(self, setting: Setting) -> MultipleModelFilter:
         models = {"nominal": self.model, **self.stated}
@@ -103,11 +104,14 @@ class ParityTest(ThresholdDetector):
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return self._space(setting).over(prepared.nominal).squares
 
-    def diagnose(self, setting: Setting, prepared: Evaluated, alarm: NDArray[np.bool_]) -> NDArray[np.intp]:
+    def run(self, setting: Setting, prepared: Evaluated, isolate: bool = True) -> Detection:
+        if not isolate:
+            return super().run(setting, prepared)
         states = InnovationFilter(self.model).over(prepared.nominal).states
         effects = [fault_effect(prepared.nominal, faulty, states) for faulty in prepared.faulty]
-        unexplained = self._space(setting).over(prepared.nominal, effects).unexplained
-        return the_only_explanation(unexplained, setting.level, alarm)
+        found = self._space(setting).over(prepared.nominal, effects)
+        alarm = above(found.squares, setting.level)
+        return Detection(alarm, the_only_explanation(found.unexplained, setting.level, alarm))
 
     def _space(self, setting: Setting) -> ParitySpace:
         return ParitySpace(self.model, int(setting.parameters["order"]))
@@ -137,15 +141,17 @@ class UnknownInputBank(ThresholdDetector):
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return window_sums(self._filter(setting).over(prepared.nominal).squares, setting.parameters["samples"])
 
-    def diagnose(self, setting: Setting, prepared: Evaluated, alarm: NDArray[np.bool_]) -> NDArray[np.intp]:
-        filter_ = self._filter(setting)
-        states = filter_.over(prepared.nominal).states
+    def run(self, setting: Setting, prepared: Evaluated, isolate: bool = True) -> Detection:
+        filter_, samples = self._filter(setting), setting.parameters["samples"]
+        found = filter_.over(prepared.nominal)
+        alarm = above(window_sums(found.squares, samples), setting.level)
+        if not isolate:
+            return Detection(alarm)
         sums = []
         for faulty in prepared.faulty:
-            state, output = fault_effect(prepared.nominal, faulty, states)
-            blind = filter_.over(prepared.nominal, *_unknown_inputs(state, output))
-            sums.append(window_sums(blind.squares, setting.parameters["samples"]))
-        return the_only_explanation(np.array(sums).T, setting.level, alarm)
+            unknown = _unknown_inputs(*fault_effect(prepared.nominal, faulty, found.states))
+            sums.append(window_sums(filter_.over(prepared.nominal, *unknown).squares, samples))
+        return Detection(alarm, the_only_explanation(np.array(sums).T, setting.level, alarm))
 
     def _filter(self, setting: Setting) -> InnovationFilter:
         return InnovationFilter(self.model, setting.parameters["process_noise"])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from svo.comparison.detector import Detection, Kind, Parameter, Setting
 from svo.log import Log
+from svo.residual_tests.interface import above
 
 Array = NDArray[np.float64]
 
@@ -35,10 +36,6 @@ class ThresholdDetector(ABC):
     def scores(self, setting: Setting, prepared: Any) -> Array:
         """The score at each sample (K,), whatever the level of the setting."""
 
-    def diagnose(self, setting: Setting, prepared: Any, alarm: NDArray[np.bool_]) -> NDArray[np.intp] | None:
-        """The fault named at each sample, -1 for none; None if the detector only detects."""
-        return None
-
     def learn(self, parameters: Mapping[str, float], healthy: Sequence[Any]) -> Mapping[str, Array]:
         return {}
 
@@ -47,6 +44,5 @@ class ThresholdDetector(ABC):
         return max(floor, float(np.max(scores[~np.isnan(scores)], initial=-np.inf)))
 
     def run(self, setting: Setting, prepared: Any, isolate: bool = True) -> Detection:
-        scores = self.scores(setting, prepared)
-        alarm = np.greater(scores, setting.level, where=~np.isnan(scores), out=np.zeros(scores.shape, dtype=bool))
-        return Detection(alarm, self.diagnose(setting, prepared, alarm) if isolate else None)
+        """Alarms alone; a detector that isolates says more."""
+        return Detection(above(self.scores(setting, prepared), setting.level))

@@ -59,9 +59,9 @@ class ActuatorFault:
     loss                (1 - m p) u, 0 < m <= 1          (1 - Delta) u, any Delta in [0, m]
     floating            (1 - p) u                        (1 - Delta) u, any Delta in [0, 1]
     hard-over           (1 - p) u + p m                  (1 - Delta) u + Delta m, any Delta in [0, 1]
-    oscillatory-solid   (1 - p) u + p m sin(2 pi f t')   (1 - Delta) u + Delta v, Delta in [0, 1], |v| <= m
-    oscillatory-liquid  u + p m sin(2 pi f t')           u + v, any |v| <= m
-    noise               u + p m r, |r| <= 1              u + v, any |v| <= m
+    oscillatory-solid   (1 - p) u + p m sin(2 pi f t')   (1 - Delta) u + Delta v, Delta in [0, 1], v in [-m, m]
+    oscillatory-liquid  u + p m sin(2 pi f t')           u + v, any v in [-m, m]
+    noise               u + p m r, r in [-1, 1]          u + v, any v in [-m, m]
     locking             (1 - p) u + p h                  any deflection within the travel
     runaway             h + m t', stopped at the travel  any deflection within the travel
     ==================  ===============================  ==================================================

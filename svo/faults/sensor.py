@@ -33,7 +33,7 @@ class SensorFault:
     =========  =============================  =======================================================
     kind       reading                        what ``model`` contains
     =========  =============================  =======================================================
-    bias       y0 + magnitude p               any additive error of size up to |magnitude|, either sign,
+    bias       y0 + magnitude p               any additive error up to the size of ``magnitude``, either sign,
                                               free to change at each sample (wider noise)
     drift      y0 + magnitude p               the same; ``magnitude`` is the error finally reached
     scaling    (1 + magnitude p) y0           (1 + Delta) y0, any Delta between 0 and ``magnitude``

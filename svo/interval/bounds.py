@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 class GainBounds:
     """Intervals of g and h in x+ = g x + (1 - g) h u, at one sample or at K samples.
 
-    g lies in gc +- min(gr + slope |hc u - xc|, limit) with xc the centre of the prediction, and h in hc +- hr. The
+    g lies in ``gc +- min(gr + slope |hc u - xc|, limit)`` with xc the centre of the prediction, and h in hc +- hr. The
     default is the plain interval gc +- gr; slope and limit are kappa_2 and kappa_3 of the paper's section 4.
 
     Parameters

@@ -25,7 +25,7 @@ class FirstOrderFit:
     parts : (n_parts, 2) array
         (g, h) of each part that moved.
     largest_error : float
-        Largest |y - simulated y| of the centre model, over all records.
+        Largest difference of y from the simulated y of the centre model, over all records.
     """
 
     gains: GainBounds
@@ -36,7 +36,7 @@ class FirstOrderFit:
 def identify_first_order(records: Log | Sequence[Log], parts: int = 4) -> FirstOrderFit:
     """Least squares of the simulation error, over all records and over each of their parts.
 
-    The predictor simulates, so the fit minimises |y - x| for x simulated from each record's first measurement by
+    The predictor simulates, so the fit minimises ``|y - x|`` for x simulated from each record's first measurement by
     inputs alone, not the error of one step ahead.
 
     Parameters
@@ -50,7 +50,7 @@ def identify_first_order(records: Log | Sequence[Log], parts: int = 4) -> FirstO
     Raises
     ------
     ValueError
-        For records with other channels, too short or without motion, or a fit with |g| >= 1.
+        For records with other channels, too short or without motion, or a fit with ``|g| >= 1``.
     """
     every = [records] if isinstance(records, Log) else list(records)
     if not every:

@@ -32,7 +32,7 @@ def move(center, radius, u, gc, gr, hc, hr, slope, limit):  # type: ignore[no-un
 def propagate(u, gc, gr, hc, hr, slope, limit, center, radius, used):  # type: ignore[no-untyped-def]
     """Fill center, radius (K,) from their first entries, and the radius of g used at each sample (K,).
 
-    Returns the first sample at which |gc| + gr < 1 fails, or -1. The last sample's transition is not made.
+    Returns the first sample at which ``|gc| + gr < 1`` fails, or -1. The last sample's transition is not made.
     """
     for k in range(u.size):
         new, wide, used[k] = move(center[k], radius[k], u[k], gc[k], gr[k], hc[k], hr[k], slope[k], limit[k])

@@ -1,8 +1,9 @@
 """The same first-order plant as a 1-D `UncertainModel`, for set-valued observers.
 
-With g = gc + gr Delta and |Delta| <= 1, x+ = gc x + (1 - gc) hc u + Delta gr (x - hc u) + d: one channel, and a
-disturbance |d| <= (|1 - gc| + gr) hr |u| for the static gain. Its reachable interval is that of the predictor, so an
-observer of this model, which also uses the measurements, stays inside the prediction made with the same gc and gr.
+With g = gc + gr Delta and Delta in [-1, 1], x+ = gc x + (1 - gc) hc u + Delta gr (x - hc u) + d: one channel, and
+a disturbance ``|d| <= (|1 - gc| + gr) hr |u|`` for the static gain. Its reachable interval is that of the predictor,
+so an observer of this model, which also uses the measurements, stays inside the prediction made with the same gc and
+gr.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ class NoiseCharacterization:
     def from_records(
         cls, records: ArrayLike | Sequence[ArrayLike], qbar: int, safety_factor: float = 1.2
     ) -> NoiseCharacterization:
-        """lambda_q = safety_factor max over all records and k of |mean of the q samples up to k|, full windows only.
+        """lambda_q = safety_factor times the largest size of a mean of q samples in all records, full windows only.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class NoiseCharacterization:
 
 
 def moving_average_extremes(signals: Sequence[Array], qbar: int) -> Array:
-    """Largest |mean over q samples| in all signals, (qbar,); NaN where no signal has q samples.
+    """Largest size of a mean over q samples in all signals, (qbar,); NaN where no signal has q samples.
 
     Time O(n qbar), vectorised by the compiler over q; rounding stays at some 1e-12 of the largest sample.
     """
@@ -164,7 +164,7 @@ def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
 
 @njit(cache=True)
 def _extreme_sums(u, best, block):  # type: ignore[no-untyped-def]
-    """Raise best[q - 1] to the largest |sum of q consecutive samples of u|, for every q with a full window.
+    """Raise best[q - 1] to the largest size of a sum of q consecutive samples of u, for every q with a full window.
 
     ``sums`` holds the partial sums of a block and of the qbar samples before it backwards, so that the inner loop
     walks two arrays side by side.

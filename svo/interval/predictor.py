@@ -1,11 +1,11 @@
-"""Interval prediction of an uncertain first-order system (paper 001, Proposition 3, corrected).
+"""Interval prediction of an uncertain first-order system (paper 001, Proposition 3, corrected)::
 
     x+ = g x + (1 - g) h u,   g in gc +- gr,   h in hc +- hr, both free to change at each sample
     xc+ = gc xc + (1 - gc) hc u                                                                       (14)
     xr+ = (|gc| + gr) xr + gr |xc - hc u| + (|1 - gc| + gr) hr |u|                                    (15)
 
-Printed, (15) has gc |xc - hc u| and u without its absolute value: the first is some thirty times too wide, the second
-loses the state.
+Printed, (15) has ``gc |xc - hc u|`` and u without its absolute value: the first is some thirty times too wide, the
+second loses the state.
 """
 
 from __future__ import annotations

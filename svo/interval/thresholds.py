@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 def filter_bound(
     bounds: ArrayLike, pole: float, *, r: int, mu: float, gain: float | None = None, output_gain: float = 1.0
 ) -> float:
-    """Bound of y_k for x_k = a x_(k-1) + b u_k, y_k = c x_k, from the last r samples (Proposition 1, (10)).
+    """Bound of y_k for x_k = a x_(k-1) + b u_k, y_k = c x_k, from the last r samples (Proposition 1, (10))::
 
-    |y_k| <= c a^r mu + c b r a^(r-1) lambda_r + c b sum_(q<r) q (a^(q-1) - a^q) lambda_q
+        |y_k| <= c a^r mu + c b r a^(r-1) lambda_r + c b sum_(q<r) q (a^(q-1) - a^q) lambda_q
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def filter_bound(
     r : int
         Number of past samples, 0 <= r <= qbar; with 0 the bound is c mu.
     mu : float
-        Bound of |x_(k-r)|.
+        Bound of the size of x_(k-r).
     gain, output_gain : float
         b and c, not negative; b is 1 - a by default (static gain one).
     """

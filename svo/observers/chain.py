@@ -210,17 +210,3 @@ class ProvingObserver(WindowObserver):
         self.checked += 1
         if not holds:
             self.unproven.append(what)
-
-
-def chain_of(bank: Any, name: str, log: Log) -> ChainCheck:
-    """`prove_chain` for one observer of a bank, by name.
-
-    Raises
-    ------
-    ValueError
-        If the bank has no window observer of that name.
-    """
-    observer = bank.observers.get(name)
-    if not isinstance(observer, WindowObserver):
-        raise ValueError(f"the bank has no window observer {name!r}; it has {', '.join(bank.observers)}")
-    return prove_chain(observer, log)

@@ -48,9 +48,15 @@ class ZonotopeCertificate:
         return self.window.last
 
     def verify(self) -> bool:
-        """Whether the proof holds in exact rational arithmetic."""
+        """Whether the proof holds in exact rational arithmetic.
+
+        False, and no error, for arrays of wrong shapes, for NaN or Inf and for a negative room or slack: a stored
+        certificate may hold anything.
+        """
         known, Z = self.window.arrival, self.arrival
-        if len(known.rows) != 1 or not (known.lower == -np.inf).all() or not self.window.verify():
+        if not self.window.verify() or not self._is_well_formed():
+            return False
+        if len(known.rows) != 1 or not (known.lower == -np.inf).all() or not np.isfinite(known.upper).all():
             return False
         nothing = np.zeros(Z.offset.size)
         hull = [
@@ -60,6 +66,17 @@ class ZonotopeCertificate:
         ]
         rows = [(known.rows[0], known.upper[0], self.multipliers), *hull]
         return all(proven_support(Z, d, mu) <= rational(h) for d, h, mu in rows)
+
+    def _is_well_formed(self) -> bool:
+        Z, n = self.arrival, self.window.n
+        ng, nc = np.size(Z.generators) // n, np.size(Z.offset)
+        expected = [
+            (Z.center, (n,)), (Z.generators, (n, ng)), (Z.room, (n,)), (Z.constraints, (nc, ng)), (Z.offset, (nc,)),
+            (Z.slack, (nc,)), (self.multipliers, (nc,)),
+        ]  # fmt: skip
+        if not all(a.dtype == np.float64 and a.shape == shape and np.isfinite(a).all() for a, shape in expected):
+            return False
+        return bool((Z.room >= 0.0).all() and (Z.slack >= 0.0).all())
 
 
 def proven_support(Z: ConstrainedZonotope, direction: Array, multipliers: Array) -> fmpq:

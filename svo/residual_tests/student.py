@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 class StudentT(WindowTest):
     """H1 where the mean of the last N residuals differs from the fault-free one by more than chance allows.
 
-    The statistic is |rbar - mean| sqrt(N) / s with the standard deviation s of the same window, so no sigma is
+    The statistic is ``|rbar - mean| sqrt(N) / s`` with the standard deviation s of the same window, so no sigma is
     needed. False-alarm rate: 1 - confidence per window, exactly, for independent Gaussian residuals.
 
     Parameters

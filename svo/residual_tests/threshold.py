@@ -25,7 +25,7 @@ _ROUNDING = 1e-12
 class StaticThreshold(WindowTest):
     """H1 where the residual is more than nu standard deviations away from its mean.
 
-    The statistic is |r - mean| / sigma. False-alarm rate: for a Gaussian residual 2 (1 - Phi(nu)) per sample,
+    The statistic is ``|r - mean| / sigma``. False-alarm rate: for a Gaussian residual 2 (1 - Phi(nu)) per sample,
     0.0027 for nu = 3, exactly, whether or not the samples are independent.
 
     Parameters
@@ -119,7 +119,7 @@ def propagated_bounds(
 
     z(k+1) = A z(k) + B w(k), r(k) = C z(k) + D w(k), z(0) = 0, lower <= w(k) <= upper. The bounds are attained:
     r(k) = sum_j H_j w(k-j), and each w(k-j) can be at the end that the sign of H_j asks for. They are widened by 1e-12
-    of sum_j |H_j| |w|, for the rounding of the residual.
+    of ``sum_j |H_j| |w|``, for the rounding of the residual.
 
     Parameters
     ----------

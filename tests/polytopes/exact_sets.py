@@ -1,5 +1,7 @@
 """The Parma library as an exact oracle for small sets of integers (or any floats)."""
 
+import math
+
 import numpy as np
 import ppl
 from numpy.typing import NDArray
@@ -48,3 +50,25 @@ def supports(polyhedron: ppl.C_Polyhedron, directions: NDArray[np.int64]) -> NDA
         answer = polyhedron.maximize(form)
         values.append(int(answer["sup_n"]) / int(answer["sup_d"]) if answer["bounded"] else np.inf)
     return np.array(values)
+
+
+def within(inner: ppl.C_Polyhedron, outer: ppl.C_Polyhedron, tol: float, reach: int = 64) -> bool:
+    """Whether `inner`, cut at a box, exceeds no row of `outer` by more than a distance `tol`.
+
+    The cut keeps two unbounded sets comparable whose recession directions differ by rounding.
+    """
+    n = inner.space_dimension()
+    cut = ppl.C_Polyhedron(inner)
+    for j in range(n):
+        cut.add_constraint(ppl.Variable(j) <= reach)
+        cut.add_constraint(ppl.Variable(j) >= -reach)
+    if cut.is_empty():
+        return True
+    for row in outer.minimized_constraints():  # a'x + a0 >= 0, or = 0
+        form = sum((c * ppl.Variable(j) for j, c in enumerate(row.coefficients())), 0 * ppl.Variable(n - 1))
+        length = math.sqrt(sum(int(c) ** 2 for c in row.coefficients()))
+        for side in (1, -1) if row.is_equality() else (1,):
+            least = cut.minimize(side * (form + row.inhomogeneous_term()))
+            if int(least["inf_n"]) / int(least["inf_d"]) < -tol * length:
+                return False
+    return True

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from svo.interval.study.run import DetectorRow, LearnsDetectors, execute
 from svo.plant import Plant, load_plant
+from svo.study.cluster import outcomes_on_cluster
 from svo.study.configuration import Job, StudyConfiguration, versions
 from svo.study.store import StudyFolder, write_whole
 
@@ -23,6 +24,7 @@ def run_detection_study(
     out: str | Path,
     *,
     workers: int = 1,
+    scheduler: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
 ) -> StudyFolder:
@@ -44,8 +46,9 @@ def run_detection_study(
     to_do = [job for job in jobs if job.run not in done]
     if progress is not None:
         progress(len(jobs) - len(to_do), len(jobs))
-    for count, (job, rows) in enumerate(_results(configuration.plant, to_do, workers), len(jobs) - len(to_do) + 1):
-        _store(folder, configuration, job.run, rows)
+    results = _results(configuration.plant, to_do, workers, scheduler)
+    for count, rows in enumerate(results, len(jobs) - len(to_do) + 1):
+        _store(folder, configuration, rows)
         if progress is not None:
             progress(count, len(jobs))
     folder.join_alarms()
@@ -61,14 +64,18 @@ def read_rows(folder: StudyFolder) -> list[DetectorRow]:
     return sorted(found, key=lambda row: row.run)
 
 
-def _results(name: str, jobs: list[Job], workers: int) -> Iterator[tuple[Job, list[DetectorRow]]]:
+def _results(name: str, jobs: list[Job], workers: int, scheduler: str | None) -> Iterator[list[DetectorRow]]:
+    """The rows of each run, wherever it runs; on a cluster in the order in which they are done."""
     work = functools.partial(_execute, name)
+    if scheduler is not None and jobs:
+        yield from outcomes_on_cluster(work, jobs, scheduler)
+        return
     if workers == 1 or len(jobs) < 2:
-        yield from ((job, work(job)) for job in jobs)
+        yield from map(work, jobs)
         return
     # Spawned, not forked: a fork would copy the locks of threads that run in this process.
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield from zip(jobs, pool.map(work, jobs, chunksize=4), strict=True)
+        yield from pool.map(work, jobs, chunksize=4)
 
 
 def _execute(name: str, job: Job) -> list[DetectorRow]:
@@ -82,7 +89,7 @@ def _plant(name: str) -> Plant:
     return load_plant(name)
 
 
-def _store(folder: StudyFolder, configuration: StudyConfiguration, run: int, rows: list[DetectorRow]) -> None:
+def _store(folder: StudyFolder, configuration: StudyConfiguration, rows: list[DetectorRow]) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -96,4 +103,4 @@ def _store(folder: StudyFolder, configuration: StudyConfiguration, run: int, row
     metadata = {"svo.configuration": json.dumps(configuration.to_dict()), "svo.versions": json.dumps(versions())}
     schema = pa.schema([(name, types[name]) for name in DetectorRow.__dataclass_fields__], metadata=metadata)
     table = pa.Table.from_pylist([asdict(row) for row in rows], schema=schema)
-    write_whole(folder.parts / f"run-{run:06d}.parquet", lambda file: pq.write_table(table, file))
+    write_whole(folder.parts / f"run-{rows[0].run:06d}.parquet", lambda file: pq.write_table(table, file))

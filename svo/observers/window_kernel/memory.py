@@ -20,6 +20,7 @@ from numba.extending import intrinsic
 FAST = {"nnan", "nsz", "reassoc", "contract"}
 UNIT = 1.1102230246251565e-16  # unit roundoff
 FEASIBILITY = 1e-9  # violation of a scaled row or variable that counts as none
+GAP = 1e-9  # between bound and optimum, as a share of the largest cost, that is not worth another factorisation
 SMALL_PIVOT = 1e-6
 REFACTOR = 60  # pivots between refactorisations
 PIVOT_LIMIT = 2000

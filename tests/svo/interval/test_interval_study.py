@@ -18,6 +18,7 @@ from svo.interval.study.summary import summarise_assumption
 from svo.interval.study.tables import assumption_lines, detection_table
 from svo.plant import load_plant
 from svo.study.configuration import StudyConfiguration
+from svo.study.store import StudyFolder
 
 pytest.importorskip("pyarrow")
 
@@ -54,6 +55,26 @@ def test_two_processes_and_a_resumed_study_give_the_same_rows(folder, tmp_path: 
     again = run_detection_study(CONFIGURATION, other.path, resume=True, progress=lambda *done: seen.append(done))
     assert seen == [(5, 6), (6, 6)]
     assert read_rows(again) == read_rows(folder)
+
+
+def test_a_cluster_gives_the_same_rows(folder, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    distributed = pytest.importorskip("distributed", reason="needs the extra 'cluster'")
+    size = {"n_workers": 1, "threads_per_worker": 1}
+    with distributed.LocalCluster(**size, processes=False, dashboard_address=None) as cluster:
+        command = ["study", "elevator", "--runs", "2", "--seed", "3", "--fault", "none", "--fault", "jam"]
+        command += ["--scheduler", cluster.scheduler_address, "--out", str(tmp_path / "spread")]
+        answer = CliRunner().invoke(app, command)
+    assert answer.exit_code == 0, answer.output
+    assert read_rows(StudyFolder(tmp_path / "spread")) == read_rows(folder)
+
+
+def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="needs the extra 'cluster'")
+    monkeypatch.setattr("svo.study.cluster._CONNECT", "0.5s")
+    command = ["study", "elevator", "--runs", "1", "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "out")]
+    answer = CliRunner().invoke(app, command)
+    assert answer.exit_code == 1
+    assert "no dask scheduler answers" in answer.output
 
 
 def test_what_is_published(folder) -> None:  # type: ignore[no-untyped-def]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.log import Log
-from svo.observers.chain import chain_of, prove_chain
+from svo.observers.chain import prove_chain
 from tests.svo.observers.random_plants import random_plant
 
 
@@ -78,11 +78,3 @@ def test_a_healthy_log_proves_its_bounds_and_no_alarm() -> None:
     log = model.simulate([0.2], np.zeros((20, 0)), np.random.default_rng(0))
     chain = prove_chain(WindowObserver(model, HPolytope.box([-1.0], [1.0])), log)
     assert (chain.proven, chain.falsified_at, chain.unproven) == (False, None, ())
-
-
-def test_the_observer_of_a_bank_is_found_by_name() -> None:
-    class Bank:
-        observers: dict[str, WindowObserver] = {}  # noqa: RUF012
-
-    with pytest.raises(ValueError, match="no window observer 'moon'"):
-        chain_of(Bank(), "moon", Log(np.zeros(1), np.zeros((1, 0)), np.zeros((1, 1))))

@@ -1,0 +1,139 @@
+"""Detection on logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors
+from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName
+from svo.cli.output import print_detection, print_json
+
+
+@app.command()
+def detect(
+    plant: DescribedName,
+    log: LogFile,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl and verdict.json.")] = None,
+    noise: NoiseName = None,
+    architecture: Architecture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a plant's isolation bank over a log, sample by sample, and say what it finds.
+
+    An empty or NaN cell of a sensor is a missing measurement. The exit code is 0 also when a fault is found.
+
+    \b
+    Example:
+      svo detect eclipse log.csv --out findings
+      svo detect my.toml log.mat --out findings
+    """
+    with one_line_errors():
+        from svo.description import find_plant, keep_description
+        from svo.detect import detect as run_detection
+        from svo.detect import write_detection
+        from svo.log_file import read_log
+        from svo.plant import DetectsThresholds, in_architecture
+        from svo.progress import progress
+
+        the_plant = in_architecture(find_plant(plant), architecture)
+        noise = chosen_noise(the_plant, noise)
+        samples = read_log(log, the_plant.columns, the_plant.Ts)
+        announce(PREPARING)
+        with progress("Samples") as update:
+            found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
+        crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
+        beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
+        if out is not None:
+            write_detection(out, found, beside)
+            keep_description(the_plant, out)
+        if as_json:
+            print_json(found.to_dict() | beside)
+            return
+        print_detection(found)
+        if crossings is not None:
+            typer.echo(crossings.to_text())
+        if out is not None:
+            typer.echo(f"Alarms with certificates: {out / 'alarms.jsonl'}")
+
+
+@app.command()
+def watch(
+    plant: DescribedName,
+    log: Annotated[str, typer.Argument(metavar="LOG", help="CSV file that is being written, or - for standard input.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl, written as they are raised.")
+    ] = None,
+    noise: NoiseName = None,
+    until_end: Annotated[
+        bool, typer.Option("--until-end", help="End where the file ends, instead of waiting for more.")
+    ] = False,
+) -> None:
+    """Show live what a plant's isolation bank says about a log that is still growing.
+
+    Which models are alive, bounds of each state by each of them, and each alarm with its certificate. In a terminal a
+    table, elsewhere plain lines. Ctrl-C ends it; standard input ends it too. The exit code is then 0.
+
+    \b
+    Example:
+      svo watch eclipse log.csv --out findings
+      logger | svo watch my.toml -
+    """
+    with one_line_errors():
+        from functools import partial
+
+        from svo.alarms import append_alarm, write_alarms
+        from svo.cli.output import console
+        from svo.description import find_plant, keep_description
+        from svo.watch.lines import lines_of
+        from svo.watch.session import Session
+        from svo.watch.view import view_of
+        from svo.watch.watch import watch as run_watch
+
+        the_plant = find_plant(plant)
+        noise = chosen_noise(the_plant, noise)
+        lines = lines_of(log, until_end)
+        session = Session(the_plant, noise, lines.name)
+        keep = None
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            write_alarms(out / "alarms.jsonl", [])
+            keep_description(the_plant, out)
+            keep = partial(append_alarm, out / "alarms.jsonl")
+        announce(PREPARING)
+        session.warm_up()
+        run_watch(lines, session, view_of(console(), session), keep=keep)
+
+
+@app.command()
+def calibrate(
+    plant: DescribedName,
+    log: LogFile,
+    noise: NoiseName = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the smallest widening of the nominal model's bounds that explains a log without faults.
+
+    For a healthy log on which `svo detect` finds a fault: it names each bound of a sensor's noise or of a disturbance
+    that is too narrow, by how much, and the sample from which on it must be wider.
+
+    \b
+    Example:
+      svo calibrate eclipse log.csv --noise quiet
+    """
+    with one_line_errors():
+        from svo.description import find_plant
+        from svo.log_calibration import calibrate_log
+        from svo.log_file import read_log
+
+        the_plant = find_plant(plant)
+        noise = chosen_noise(the_plant, noise)
+        samples = read_log(log, the_plant.columns, the_plant.Ts)
+        announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
+        found = calibrate_log(the_plant, samples, noise)
+        if as_json:
+            print_json(found.to_dict())
+        else:
+            typer.echo(found.to_text())

@@ -1,0 +1,26 @@
+"""Arguments and options that several commands take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+DescribedName = Annotated[
+    str, typer.Argument(metavar="PLANT", help="A registered plant, or a TOML file that describes one (my.toml).")
+]
+LogFile = Annotated[
+    Path, typer.Argument(metavar="LOG", help="CSV, Parquet or MAT file with the plant's columns (`svo plants --json`).")
+]
+PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered plant; `svo plants` lists them.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]
+NoiseName = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Noise set: the bounds assumed. [default: the plant's first]")
+]
+Architecture = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Architecture of the bank, such as I or II. [default: the plant's own]"),
+]
+FlightSeed = Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")]
+FaultSize = Annotated[float, typer.Option(metavar="FRACTION", help="Size of the faults, of those the plant states.")]

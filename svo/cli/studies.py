@@ -1,0 +1,220 @@
+"""Plants, and studies of simulated runs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors
+from svo.cli.options import AsJson, NoiseName, PlantName
+from svo.cli.output import describe, print_detector_study, print_json, print_study
+
+if TYPE_CHECKING:
+    from svo.interval.study import LearnsDetectors
+    from svo.study.configuration import StudyConfiguration
+
+
+@app.command()
+def plants(as_json: AsJson = False) -> None:
+    """List the plants that are registered.
+
+    \b
+    Example:
+      svo plants
+    """
+    with one_line_errors():
+        from svo.plant import load_plant, registered_plants
+
+        every = [load_plant(name) for name in registered_plants()]
+        if as_json:
+            print_json([describe(plant) for plant in every])
+            return
+        for plant in every:
+            typer.echo(f"{plant.name}: {plant.title}")
+            for fault, profiles in plant.faults.items():
+                typer.echo(f"    fault {fault}: {', '.join(profiles)}")
+            typer.echo(f"    noise sets: {', '.join(plant.noise_sets)}; sampling time {plant.Ts:g} s")
+
+
+@app.command()
+def study(
+    plant: PlantName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results; new or empty, unless --resume.")],
+    runs: Annotated[
+        int, typer.Option(min=1, help="Runs of each noise set, fault and profile, and without a fault.")
+    ] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the study; the same seed gives the same runs.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
+    or 1,
+    noise: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Noise set; may be repeated. [default: the plant's first]")
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Fault, or none for fault-free runs; may be repeated. [default: all and none]"
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Run on the dask.distributed cluster of this scheduler instead."),
+    ] = None,
+    architecture: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Architecture of the bank; several see the same runs. [default: the plant's own]"
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Measure times to detect and to isolate over many simulated runs.
+
+    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html. A plant with
+    interval detectors (elevator) is studied with these, each learnt anew in every run.
+
+    \b
+    Example:
+      svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
+      svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
+      svo study elevator --runs 200 --seed 0 --out results
+    """
+    with one_line_errors():
+        _need_study_extra()
+        from svo.interval.study import LearnsDetectors
+        from svo.plant import load_plant
+        from svo.progress import progress
+        from svo.study.configuration import StudyConfiguration
+        from svo.study.publish import publish
+        from svo.study.runner import run_study, warm_up
+        from svo.study.store import StudyFolder
+
+        the_plant = load_plant(plant)
+        configuration = StudyConfiguration.for_plant(
+            the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
+        )
+        StudyFolder(out).check(configuration, resume)
+        if isinstance(the_plant, LearnsDetectors):
+            _study_detectors(the_plant, configuration, out, workers, scheduler, resume, as_json)
+            return
+        announce(PREPARING)
+        warm_up(the_plant, configuration.noise[0])
+        with progress("Runs") as update:
+            folder = run_study(configuration, out, workers=workers, scheduler=scheduler, resume=resume, progress=update)
+        announce("Writing summary, pictures and report")
+        summaries = publish(folder, the_plant)
+        if as_json:
+            from svo.study.summary import to_json
+
+            print_json({"configuration": configuration.to_dict(), "summary": to_json(summaries)})
+        else:
+            print_study(the_plant, summaries)
+            typer.echo(f"Report: {out / 'report.html'}")
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study, finished or still running.")],
+) -> None:
+    """Write summary.csv, pictures and report.html of a study from the runs that it has so far.
+
+    \b
+    Example:
+      svo report results
+    """
+    with one_line_errors():
+        _need_study_extra()
+        from svo.interval.study import LearnsDetectors
+        from svo.interval.study import publish as publish_detectors
+        from svo.plant import load_plant
+        from svo.study.publish import publish
+        from svo.study.store import StudyFolder
+
+        study = StudyFolder(folder)
+        the_plant = load_plant(study.identity()["configuration"]["plant"])
+        if not any(study.parts.glob("run-*.parquet")):
+            raise ValueError(f"{folder} holds no finished run yet; its report needs one")
+        if isinstance(the_plant, LearnsDetectors):
+            publish_detectors(study, the_plant)
+        else:
+            publish(study, the_plant)
+        typer.echo(f"Report: {folder / 'report.html'}")
+
+
+@app.command()
+def simulate(
+    plant: PlantName,
+    out: Annotated[Path, typer.Option(metavar="LOG.csv", help="CSV file to write.")],
+    fault: Annotated[str, typer.Option(metavar="NAME", help="Fault to simulate, or none.")] = "none",
+    profile: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Shape of the fault in time. [default: the fault's first]")
+    ] = None,
+    noise: NoiseName = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed; that of a row of runs.parquet gives that very run.")] = 0,
+) -> None:
+    """Simulate one run and write its log, true states included.
+
+    \b
+    Example:
+      svo simulate eclipse --fault elevator --profile step --noise quiet --seed 0 --out log.csv
+    """
+    with one_line_errors():
+        from svo.log_file import write_log
+        from svo.plant import HEALTHY, fault_start, load_plant
+        from svo.study.configuration import check_fault
+
+        the_plant = load_plant(plant)
+        noise = chosen_noise(the_plant, noise)
+        if fault == HEALTHY:
+            if profile not in (None, HEALTHY):
+                raise ValueError(
+                    f"profile {profile!r} is given without a fault; name one with --fault, or leave --profile out"
+                )
+            profile = HEALTHY
+        else:
+            check_fault(the_plant, fault, profile)
+            profile = profile or the_plant.faults[fault][0]
+        log = the_plant.simulate(fault, profile, noise, seed)
+        write_log(out, log, the_plant.columns)
+        start = fault_start(the_plant, fault, profile)
+        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {start:g} s"
+        typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
+
+
+def _study_detectors(
+    the_plant: LearnsDetectors,
+    configuration: StudyConfiguration,
+    out: Path,
+    workers: int,
+    scheduler: str | None,
+    resume: bool,
+    as_json: bool,
+) -> None:
+    from svo.interval.study import publish, run_detection_study
+    from svo.progress import progress
+
+    with progress("Runs") as update:
+        folder = run_detection_study(
+            configuration, out, workers=workers, scheduler=scheduler, resume=resume, progress=update
+        )
+    announce("Writing summary, pictures and report")
+    found = publish(folder, the_plant)
+    if as_json:
+        print_json({"configuration": configuration.to_dict(), **found.to_dict()})
+        return
+    print_detector_study(found)
+    typer.echo(f"Report: {out / 'report.html'}")
+
+
+def _need_study_extra() -> None:
+    from importlib.util import find_spec
+
+    if find_spec("pyarrow") is None:
+        raise ValueError(
+            "svo study needs pyarrow, which is not installed; install the extra: pip install 'svo-fdi[study]'"
+        )
