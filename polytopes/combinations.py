@@ -38,6 +38,13 @@ def everything(n: int) -> Table:
     return np.empty((0, n)), np.empty(0), np.empty((0, n)), np.empty(0)
 
 
+def product(P: Rows, Q: Rows) -> Table:
+    """``{(x, y) : x in P, y in Q}``."""
+    A = np.vstack([np.hstack([P.A, np.zeros((P.b.size, Q.dim))]), np.hstack([np.zeros((Q.b.size, P.dim)), Q.A])])
+    C = np.vstack([np.hstack([P.C, np.zeros((P.d.size, Q.dim))]), np.hstack([np.zeros((Q.d.size, P.dim)), Q.C])])
+    return A, np.concatenate([P.b, Q.b]), C, np.concatenate([P.d, Q.d])
+
+
 def affine_image(P: Rows, M: Floats, t: Floats) -> Table:
     """``{M x + t : x in P}`` for any matrix M (p, n).
 

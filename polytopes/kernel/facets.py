@@ -231,12 +231,16 @@ def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
     doubtful = np.zeros(m, np.int64)
     c, x, W, Q = np.empty(d), np.empty(d), np.empty(d, np.int64), np.empty((d, d))
     reach, rate, work = 1.0 / b, np.empty(m), np.empty((d, 2 * d))
-    for j in range(2 * d):  # a few facets to begin with
-        c[:] = 0.0
-        c[j // 2] = 1.0 - 2.0 * (j % 2)
-        row, tie = _first_hit(AT, reach, c, rate)
-        if not tie:
-            state[row] = 1
+    tries = 2 * d  # rays are worth their while as long as most of them find a facet
+    for i in range(m):
+        if state[i] == 0 and tries > 0:
+            c[:] = AT[:, i]
+            row, tie = _first_hit(AT, reach, c, rate)
+            if tie or state[row] != 0:
+                tries -= 1
+            else:
+                state[row] = 1
+                tries += 1
     facets, values = np.empty((d, m)), np.empty(m)
     n = 0
     for i in range(m):
