@@ -58,7 +58,7 @@
       const column = Math.max(30, Math.min(78, (room(svg) - left - 8) / kinds.length));
       const upright = column < 62;
       const lines = noises + architectures + 2;
-      const width = left + column * kinds.length + 8, foot = top + never + height;
+      const width = Math.max(300, left + column * kinds.length + 8), foot = top + never + height;
       size(svg, width, foot + (upright ? 16 + 7 * Math.max(...kinds.map((name) => name.length)) : 10 + 15 * lines));
       const y = (value) => (value === null ? top : top + never + height * (high - Math.log10(value)) / (high - low));
       node(svg, "text", { x: 0, y: 12 }, "time after the fault");
