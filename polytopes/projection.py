@@ -8,7 +8,7 @@ set in fewer coordinates.  Then
 - "convex-hull" refines a hull of support points; the choice for dense rows, its cost goes with the facets it finds;
 - "vertices" takes the hull of projected vertices; good only while the vertices can be listed (total dimension <= 6).
 
-"auto" eliminates as long as no step forms more than 1000 rows (some 5 ms) or lets the next one be foreseen to.  Beyond,
+"auto" eliminates as long as no step forms more than 3000 rows (some 5 ms) or lets the next one be foreseen to.  Beyond,
 a bounded set of at most 5 coordinates, or of 6 with a shadow in 4 or 5, goes by its vertices (each round of the
 refinement is a hull in so many coordinates); any other with a bounded shadow by the hull of support points.  Measured
 on sets of 4 to 8 coordinates and 30 to 80 rows, see ``docs/polytopes.md``.
@@ -32,7 +32,7 @@ from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
 METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
-_CHEAP_ROWS = 1000  # rows of one step; beyond, another method was faster in every measured case
+_CHEAP_ROWS = 3000  # rows of one step; beyond, another method was faster in every measured case
 _LISTED = 6  # coordinates up to which the vertices of dense rows are few enough to list
 _FEW = 5  # coordinates up to which listing them always was the fastest
 _COSTLY_SHADOW = 4  # coordinates of a shadow from which one hull of all vertices beats several of support points
