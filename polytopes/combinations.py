@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.errors import ProjectionLimitError
+from polytopes.exact import ZERO, rational, rational_vector, row_to_floats
+from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
 from polytopes.hull import rows_of_points
+from polytopes.linear_program import Program
 from polytopes.projection import project
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty, maxima
@@ -20,6 +23,7 @@ Floats = NDArray[np.float64]
 Table = tuple[Floats, Floats, Floats, Floats]
 _DIRECT = 1e8  # condition number up to which an image is formed with the inverse of the map
 _CONSTANT = 1e-12  # relative variation of a linear form over a set that counts as none
+_ROUNDED = 1e-9  # radius of a largest ball, relative to the size of b, from which rounding makes no difference
 _MAX_ROWS = 20_000
 _CHEAP_ROWS = 1000
 
@@ -32,6 +36,13 @@ def nothing(n: int) -> Table:
 def everything(n: int) -> Table:
     """Rows of the whole space: none."""
     return np.empty((0, n)), np.empty(0), np.empty((0, n)), np.empty(0)
+
+
+def product(P: Rows, Q: Rows) -> Table:
+    """``{(x, y) : x in P, y in Q}``."""
+    A = np.vstack([np.hstack([P.A, np.zeros((P.b.size, Q.dim))]), np.hstack([np.zeros((Q.b.size, P.dim)), Q.A])])
+    C = np.vstack([np.hstack([P.C, np.zeros((P.d.size, Q.dim))]), np.hstack([np.zeros((Q.d.size, P.dim)), Q.C])])
+    return A, np.concatenate([P.b, Q.b]), C, np.concatenate([P.d, Q.d])
 
 
 def affine_image(P: Rows, M: Floats, t: Floats) -> Table:
@@ -79,7 +90,7 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     """``{x : x + y in P for all y in Q}``: each row moves inward by the support of Q.
 
     An equality ``c'x = d`` of P survives only if ``c'y`` is constant over Q (to 1e-12 of its size); else nothing is
-    left.
+    left.  Where rounding could empty what is flat, or the reverse, the supports are exact.
     """
     k = P.b.size
     result = maxima(Q, np.vstack([P.A, P.C, -P.C]))
@@ -90,7 +101,30 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     upper, lower = result.values[k : k + P.d.size], -result.values[k + P.d.size :]
     if (upper - lower > _CONSTANT * np.maximum(1.0, np.abs(upper))).any():
         return nothing(P.dim)
-    return P.A.copy(), P.b - result.values[:k], P.C.copy(), P.d - (upper + lower) / 2.0
+    C, d = P.C.copy(), P.d - (upper + lower) / 2.0
+    rest = Rows(P.A, P.b - result.values[:k], C, d)
+    if _clear(rest.program):
+        return rest.A, rest.b, C, d
+    return *_moved_exactly(P, Q, rest), C, d
+
+
+def _clear(program: Program) -> bool:
+    """Whether rounding of the right-hand sides changes neither emptiness nor dimension."""
+    nearest = abs(program.interior.radius) if program.consistent else 0.0
+    return program.fat or nearest > _ROUNDED * program.size
+
+
+def _moved_exactly(P: Rows, Q: Rows, rest: Rows) -> tuple[Floats, Floats]:
+    """The rows of P moved inward by the exact supports of Q, up to positive factors; those of `rest` if Q is large."""
+    point = exact_feasibility(Q.A, Q.b, Q.program.flat, Q.program.interior.point) if affordable(*Q.A.shape) else None
+    if point is None or point.status != "reached":
+        return rest.A, rest.b
+    table = np.column_stack([rest.A, rest.b])
+    for i, row in enumerate(P.A):
+        best = exact_maximum(Q.A, Q.b, Q.program.flat, row, point.point)
+        if best.status == "optimal":
+            table[i] = row_to_floats([*rational_vector(row), rational(P.b[i]) - best.value], ZERO)[:-1]
+    return table[:, :-1], table[:, -1]
 
 
 def hull_of_union(sets: Sequence[Rows]) -> Table:

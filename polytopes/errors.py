@@ -61,3 +61,10 @@ def as_matrix(name: str, value: ArrayLike, columns: int) -> NDArray[np.float64]:
     if matrix.shape[1] != columns:
         raise ValueError(f"{name} has shape {matrix.shape}; expected {columns} columns, the dimension of the set.")
     return matrix
+
+
+def as_tolerance(tol: float) -> float:
+    """A nonnegative distance; ValueError otherwise."""
+    if not tol >= 0.0:
+        raise ValueError(f"tol is {tol}; expected a nonnegative distance.")
+    return float(tol)

@@ -32,6 +32,7 @@ def eliminate(
     Parameters
     ----------
     A, b : arrays (m, n) and (m,)
+        No zero rows.
     columns : list of int
         Coordinates to eliminate; the one that makes the fewest pairs goes first.
     inner : array (n,)
@@ -52,16 +53,12 @@ def eliminate(
         If one step would form more than `max_rows` rows.
     """
     warm_up()
-    table = np.column_stack([A, b])
-    if not A.any(axis=1).all():
-        table = table[A.any(axis=1)]
     inner, left, rest = np.ascontiguousarray(inner), np.arange(A.shape[1]), np.array(columns, dtype=np.int64)
-    table, doubtful = kernel.pruned(table, inner)
-    table = _settled(table, doubtful, inner)
+    table, known = np.column_stack([A, b]), np.zeros(b.size, np.int64)
     done, state = 0, kernel.PAUSED
     while state != kernel.FINISHED:
         table, left, rest, inner, doubtful, trace, formed, state = kernel.eliminate(
-            table, left, rest, inner, max_rows, cautious
+            table, known, left, rest, inner, max_rows, cautious
         )
         if _LOG.isEnabledFor(logging.INFO):
             for made, kept in trace:
@@ -74,12 +71,7 @@ def eliminate(
                 "another method."
             )
         if state == kernel.OPEN:
-            table = _settled(table, doubtful, inner)
+            facets = settle(table[:, :-1], table[:, -1], inner, doubtful)
+            table = np.ascontiguousarray(table[facets])
+        known = np.ones(len(table), np.int64)
     return table[:, :-1], table[:, -1]
-
-
-def _settled(table: Floats, doubtful: NDArray[np.int64], inner: Floats) -> Floats:
-    """The facets among rows ``[A, b]``, some of which the kernel may have left open."""
-    if doubtful.any():
-        table = np.ascontiguousarray(table[settle(table[:, :-1], table[:, -1], inner, doubtful)])
-    return table

@@ -11,7 +11,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from polytopes.affine import affine_set
+from polytopes.affine import AffineSet, affine_set
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.exact import row_to_floats
 from polytopes.hull import normals_of_span
@@ -60,32 +60,37 @@ def generators(P: Rows) -> Generators:
 def rows_of_generators(V: Floats, rays: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Rows A, b, C, d of ``conv(V) + cone(rays)``: the generators of the cone of all rows that hold.
 
-    Points and rays within 1e-12 of their spread of a subspace give explicit equalities; the rows are found in as many
-    coordinates, taken as they are, as that subspace has dimensions.
+    Points and rays within 1e-12 of their spread of a subspace give explicit equalities, exact ones if they lie in it
+    exactly; the rows are found in as many of the coordinates as the subspace has dimensions.
     """
+    n = V.shape[1]
+    points, cone = np.hstack([V, -np.ones((len(V), 1))]), np.hstack([rays, np.zeros((len(rays), 1))])
+    holds = np.vstack([points, cone])
+    C = _normals(V, rays)
+    d = C @ V.mean(axis=0)
+    exact = _lines(affine_set(holds, np.zeros(len(holds))))
+    if len(exact) == len(C):
+        C, d = exact[:, :-1], exact[:, -1]
+    free = [*affine_set(C, d).free, n]
+    reduced, _ = _cone(holds[:, free])
+    found = np.zeros((len(reduced), n + 1))
+    found[:, free] = reduced
+    proper = np.abs(found[:, :-1]).max(axis=1, initial=0.0) > _AT_INFINITY * np.abs(found[:, -1])
+    return found[proper, :-1], found[proper, -1], C, d
+
+
+def _normals(V: Floats, rays: Floats) -> Floats:
+    """Unit normals of the affine hull of points and rays, all taken to be about as long."""
     longest = np.abs(rays).max(axis=1, keepdims=True)
     offsets = V - V.mean(axis=0)
     directions = rays / np.where(longest > 0.0, longest, 1.0) * (np.abs(offsets).max() or 1.0)
-    C = normals_of_span(np.vstack([offsets, directions]))
-    d = C @ V.mean(axis=0)
-    free = affine_set(C, d).free
-    k = len(V)
-    holds = np.vstack([np.hstack([V, -np.ones((k, 1))]), np.hstack([rays, np.zeros((len(rays), 1))])])
-    found, _ = _cone(holds[:, [*free, V.shape[1]]])
-    proper = np.abs(found[:, :-1]).max(axis=1, initial=0.0) > _AT_INFINITY * np.abs(found[:, -1])
-    A = np.zeros((np.count_nonzero(proper), V.shape[1]))
-    A[:, free] = found[proper, :-1]
-    return A, found[proper, -1], C, d
+    return normals_of_span(np.vstack([offsets, directions]))
 
 
 def _cone(G: Floats) -> tuple[Floats, Floats]:
     """Extreme rays and lines of ``{y : G y <= 0}``."""
     n = G.shape[1]
     null = affine_set(G, np.zeros(len(G)))
-    lines = np.zeros((len(null.free), n))
-    for q in range(len(null.free)):
-        line = null.lift_exactly([fmpq(int(q == k)) for k in range(len(null.free))])
-        lines[q] = row_to_floats(line[:-1], line[-1])
     across = G[:, null.pivots]
     lengths = np.linalg.norm(across, axis=1)
     slicing = -(across[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0)
@@ -97,4 +102,13 @@ def _cone(G: Floats) -> tuple[Floats, Floats]:
             raise UndecidedError("rounding hides which generators are extreme and which cancel.") from None
         rays = np.zeros((len(corners), n))
         rays[:, null.pivots] = corners
-    return rays, lines
+    return rays, _lines(null)
+
+
+def _lines(null: AffineSet) -> Floats:
+    """Directions (l, n) of a linear subspace, exact where integers are."""
+    lines = np.zeros((len(null.free), null.dim))
+    for q in range(len(null.free)):
+        line = null.lift_exactly([fmpq(int(q == k)) for k in range(len(null.free))])
+        lines[q] = row_to_floats(line[:-1], line[-1])
+    return lines

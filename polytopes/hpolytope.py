@@ -11,7 +11,7 @@ from polytopes import combinations, containment, plotting, projection, reduction
 from polytopes import support as support_functions
 from polytopes.affine_hull import affine_dim
 from polytopes.emptiness import Emptiness
-from polytopes.errors import as_array, as_matrix, as_vector
+from polytopes.errors import as_array, as_matrix, as_tolerance, as_vector
 from polytopes.generators import Generators, generators, rows_of_generators
 from polytopes.hull import rows_of_points
 from polytopes.inner_box import inner_box
@@ -194,7 +194,7 @@ class HPolytope(Rows):
             Nonnegative distance, in the units of x: every half-space and hyperplane may be missed by that much.  The
             test is in floats; with tol = 0 a point on the boundary may go either way.  A set costs one program a row.
         """
-        slack = _tolerance(tol)
+        slack = as_tolerance(tol)
         if isinstance(x, Rows):
             return containment.contains_set(self, same_space(self, x), slack)
         points = as_array("x", x, np.ndim(np.asarray(x)))
@@ -205,7 +205,7 @@ class HPolytope(Rows):
 
     def equals(self, Q: Rows, tol: float = 1e-9) -> bool:
         """Whether each set contains the other within `tol` (see `contains`)."""
-        return containment.equal_sets(self, same_space(self, Q), _tolerance(tol))
+        return containment.equal_sets(self, same_space(self, Q), as_tolerance(tol))
 
     def vertices(self) -> Floats:
         """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
@@ -266,11 +266,10 @@ class HPolytope(Rows):
 
     def product(self, Q: Rows) -> Self:
         """Cartesian product ``{(x, y) : x in P, y in Q}``."""
-        A, C = _block_diagonal(self.A, Q.A), _block_diagonal(self.C, Q.C)
-        return type(self)(A, np.concatenate([self.b, Q.b]), C, np.concatenate([self.d, Q.d]))
+        return type(self)(*combinations.product(self, Q))
 
     def preimage(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
-        """``{x : M x + t in P}``.
+        """``{x : M x + t in P}``: rows multiplied out and rounded, so make implicit equalities explicit first.
 
         Parameters
         ----------
@@ -395,16 +394,3 @@ class HPolytope(Rows):
         if len(pair) not in (2, 3) or len(set(pair)) != len(pair) or not all(0 <= j < self.dim for j in pair):
             raise ValueError(f"dims is {tuple(dims)}; expected two or three different coordinates below {self.dim}.")
         return plotting.plot(self, ax, pair, style)
-
-
-def _tolerance(tol: float) -> float:
-    if not tol >= 0.0:
-        raise ValueError(f"tol is {tol}; expected a nonnegative distance.")
-    return float(tol)
-
-
-def _block_diagonal(P: Floats, Q: Floats) -> Floats:
-    table = np.zeros((P.shape[0] + Q.shape[0], P.shape[1] + Q.shape[1]))
-    table[: P.shape[0], : P.shape[1]] = P
-    table[P.shape[0] :, P.shape[1] :] = Q
-    return table

@@ -54,8 +54,7 @@ def warm_up() -> None:
         kernel.supports(AT, b, np.zeros(1), np.ones((1, 1)))
         kernel.irredundant(AT, b, np.zeros(1))
         table, names = np.array([[1.0, 1.0, 1.0], [-1.0, 0.0, 1.0], [0.0, -1.0, 1.0]]), np.arange(2)
-        kernel.pruned(table, np.zeros(2))
-        kernel.eliminate(table, names, names[:1], np.zeros(2), 10, False)
+        kernel.eliminate(table, np.zeros(3, np.int64), names, names[:1], np.zeros(2), 10, False)
     finally:
         announce.cancel()
 
@@ -143,11 +142,9 @@ class Program:
         cap = 2.0 * self.size / float(self.norms.min())
         if self._small:
             warm_up()
-            z, radius, status, active, y = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), cap)
+            z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), cap)
             if status == kernel.OPTIMAL:
-                weights = np.zeros(kept + 1)
-                weights[active[active >= 0]] = y[active >= 0]
-                proof = self._unscaled(weights[:kept])
+                proof = self._unscaled(weights)
                 return Interior(self.flat.lift(z * self.columns), _uncapped(radius, cap), proof, True)
         return self._interior_by_highs(cap)
 
@@ -201,8 +198,9 @@ class Program:
         solved = np.array([name == OPTIMAL for name in status])
         upper, lower = np.split(np.where(solved[:, None], points, np.nan), 2)
         widths = np.diag(upper) - np.diag(lower)
-        rest = np.maximum(self.rhs - self.centre @ self.AT, _NOISE * self.size)
-        steepest = (np.abs(self.AT) / rest).max(axis=1)
+        rest = self.rhs - self.centre @ self.AT
+        open_ = rest > _NOISE * self.size  # a row that holds with equality says nothing about a width
+        steepest = (np.abs(self.AT[:, open_]) / rest[open_]).max(axis=1, initial=0.0)
         widths = np.where(np.isnan(widths) & (steepest > 0.0), 1.0 / np.maximum(steepest, 1e-30), widths)
         size = np.abs(np.where(solved[:, None], points, 0.0)).max(axis=0, initial=float(np.abs(self.centre).max()))
         known = widths > _NOISE * size

@@ -66,7 +66,7 @@ def project(
     if not known_nonempty(P):
         return np.zeros((1, k)), np.array([-1.0]), np.empty((0, k)), np.empty(0)
     P = explicit(P)
-    if not P.d.size and P.A.any(axis=1).all():
+    if not P.d.size and P.program.kept.size == P.b.size:
         order = [*keep, *(j for j in range(n) if j not in keep)]
         body = P if order == list(range(n)) else Rows(P.A[:, order], P.b)
         A, b = _project_body(body, k, P.program.interior.point[order], method, max_rows, outer)

@@ -43,17 +43,6 @@ def dual_hull(rows: Floats, rhs: Floats, inner: Floats) -> tuple[list[list[int]]
     raise UndecidedError(_given_up(f"the vertices of {len(rhs)} rows"))
 
 
-def dual_vertices(AT: Floats, b: Floats, inner: Floats) -> NDArray[np.int64]:
-    """Numbers of the rows that Qhull takes for facets around the point `inner`; all rows if it gives up."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        numbers: NDArray[np.int64] = np.sort(ConvexHull((AT / (b - inner @ AT)).T).vertices).astype(np.int64)
-    except (QhullError, ValueError):
-        return np.arange(b.size)
-    return numbers
-
-
 def points_volume(points: Floats) -> float:
     """Volume of the hull of points (k, n), n >= 2."""
     from scipy.spatial import ConvexHull, QhullError

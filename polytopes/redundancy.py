@@ -8,14 +8,12 @@ from polytopes.affine_hull import explicit
 from polytopes.exact import rational, rational_matrix, rational_vector
 from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
 from polytopes.frame import unit_body
-from polytopes.linear_program import OPTIMAL, Program, prepare, warm_up
-from polytopes.qhull import dual_vertices
+from polytopes.linear_program import Program, prepare, warm_up
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_DUAL_FROM = {2: 1000, 3: 4000}  # rows, by dimension; with fewer, programs alone are faster than Qhull's dual hull
 
 
 def minimal_rows(P: Rows) -> tuple[Floats, Floats, Floats, Floats]:
@@ -63,26 +61,8 @@ def irredundant(AT: Floats, b: Floats, inner: Floats) -> Indices:
     """
     warm_up()
     inner = np.ascontiguousarray(inner)
-    if b.size >= _DUAL_FROM.get(len(AT), np.inf):
-        candidates = _candidates(AT, b, inner)
-        AT, b = np.ascontiguousarray(AT[:, candidates]), b[candidates]
-        return candidates[_by_programs(AT, b, inner)]
-    return _by_programs(AT, b, inner)
-
-
-def _by_programs(AT: Floats, b: Floats, inner: Floats) -> Indices:
     kept, doubtful = kernel.irredundant(AT, b, inner)
     return kept[settle(AT[:, kept].T, b[kept], inner, doubtful)] if doubtful.any() else kept
-
-
-def _candidates(AT: Floats, b: Floats, inner: Floats) -> Indices:
-    """Rows that the hull of the dual points proposes, and those that programs do not confirm to follow from them."""
-    proposed = dual_vertices(AT, b, inner)
-    others = np.setdiff1d(np.arange(b.size), proposed)
-    program = prepare(AT[:, proposed].T, b[proposed], np.empty((0, len(AT))), np.empty(0))
-    best = program.maximise(AT[:, others].T)
-    implied = (best.values <= b[others]) & (np.array(best.status, dtype=object) == OPTIMAL)
-    return np.sort(np.append(proposed, others[~implied]))
 
 
 def settle(A: Floats, b: Floats, inner: Floats, doubtful: Indices) -> Indices:

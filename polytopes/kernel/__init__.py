@@ -8,7 +8,7 @@ entries      what Python calls
 """
 
 from polytopes.kernel.elimination import FINISHED, OPEN, PAUSED, TOO_MANY
-from polytopes.kernel.entries import eliminate, interior, irredundant, pruned, supports
+from polytopes.kernel.entries import eliminate, interior, irredundant, supports
 from polytopes.kernel.simplex import AMBIGUOUS, LIMIT, OPTIMAL, STOPPED, UNBOUNDED
 
 __all__ = [
@@ -24,6 +24,5 @@ __all__ = [
     "eliminate",
     "interior",
     "irredundant",
-    "pruned",
     "supports",
 ]

@@ -45,10 +45,13 @@ def _foreseen(formed: int, dimension: int) -> float:
 
 
 @njit(error_model="numpy")  # products and sums as written: rows of small integers stay exact
-def _combined(table: Matrix, j: int, formed: int) -> Matrix:
-    """All rows ``[A, b]`` without x_j and all pairs in which it cancels, scaled by powers of two; no zero rows."""
+def _combined(table: Matrix, j: int, formed: int) -> tuple[Matrix, Index]:
+    """All rows ``[A, b]`` without x_j and all pairs in which it cancels, scaled by powers of two; no zero rows.
+
+    With them, whether a row was there before.
+    """
     m, width = table.shape
-    rows = np.empty((formed, width - 1))
+    rows, old = np.empty((formed, width - 1)), np.empty(formed, np.int64)
     count = 0
     for first in range(m):
         for second in range(m):
@@ -74,29 +77,32 @@ def _combined(table: Matrix, j: int, formed: int) -> Matrix:
                 factor = math.ldexp(1.0, -math.frexp(largest)[1])
                 for k in range(width - 1):
                     rows[count, k] *= factor
+                old[count] = 1 if up == 0.0 else 0
                 count += 1
-    return rows[:count]
+    return rows[:count], old[:count]
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def pruned(table: Matrix, inner: Vector) -> tuple[Matrix, Index]:
-    """The facets among rows ``[A, b]`` that are not zero, and for each whether it is doubtful."""
+def pruned(table: Matrix, inner: Vector, known: Index) -> tuple[Matrix, Index]:
+    """The facets among rows ``[A, b]`` that are not zero, some known to be facets; for each whether it is doubtful."""
     if table.shape[0] == 0:
         return table, np.empty(0, np.int64)
-    rows, doubtful = irredundant(np.ascontiguousarray(table[:, :-1].T), table[:, -1].copy(), inner)
+    rows, doubtful = irredundant(np.ascontiguousarray(table[:, :-1].T), table[:, -1].copy(), inner, known)
     return table[rows], doubtful
 
 
 @njit(error_model="numpy", fastmath=FAST)
 def eliminate(
-    table: Matrix, left: Index, columns: Index, inner: Vector, max_rows: int, cautious: bool
+    table: Matrix, known: Index, left: Index, columns: Index, inner: Vector, max_rows: int, cautious: bool
 ) -> tuple[Matrix, Index, Index, Vector, Index, Index, int, int]:
-    """Eliminate coordinates, the one that makes the fewest pairs first, until something is for Python to decide.
+    """Prune, then eliminate coordinates, the one that makes the fewest pairs first, until Python has to decide.
 
     Parameters
     ----------
     table : array (m, d + 1)
-        Minimal rows ``[A, b]``.
+        Rows ``[A, b]`` without zero rows.
+    known : array (m,) of int
+        1 for rows that are facets for sure.
     left : array (d,) of int
         Names of the columns of A.
     columns : array of int
@@ -121,9 +127,18 @@ def eliminate(
     state : int
         `FINISHED`, `TOO_MANY`, `OPEN` (rows are doubtful) or `PAUSED` (after a long step).
     """
-    trace, steps = np.zeros((columns.size, 2), np.int64), 0
-    doubtful = np.zeros(0, np.int64)
-    while columns.size > 0:
+    trace, steps, formed = np.zeros((columns.size, 2), np.int64), 0, 0
+    while True:
+        table, doubtful = pruned(table, inner, known)
+        if formed > 0:
+            trace[steps, 0], trace[steps, 1] = formed, table.shape[0]
+            steps += 1
+        if doubtful.any():
+            return table, left, columns, inner, doubtful, trace[:steps], 0, OPEN
+        if columns.size == 0:
+            return table, left, columns, inner, doubtful, trace[:steps], 0, FINISHED
+        if formed > _LONG:
+            return table, left, columns, inner, doubtful, trace[:steps], 0, PAUSED
         j, formed = _cheapest(table, left, columns)
         more = columns.size > 1 and cautious
         if formed > max_rows or (more and _foreseen(formed, left.size - 1) > max_rows):
@@ -131,11 +146,5 @@ def eliminate(
         columns = columns[columns != left[j]]
         rest = np.arange(left.size) != j
         left, inner = left[rest], inner[rest]
-        table, doubtful = pruned(_combined(table, j, formed), inner)
-        trace[steps, 0], trace[steps, 1] = formed, table.shape[0]
-        steps += 1
-        if doubtful.any():
-            return table, left, columns, inner, doubtful, trace[:steps], 0, OPEN
-        if formed > _LONG and columns.size > 0:
-            return table, left, columns, inner, doubtful, trace[:steps], 0, PAUSED
-    return table, left, columns, inner, doubtful, trace[:steps], 0, FINISHED
+        # A facet parallel to x_j stays one: a point that violates it alone does so in the shadow too.
+        table, known = _combined(table, j, formed)

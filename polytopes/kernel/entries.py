@@ -2,13 +2,14 @@
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from polytopes.kernel import elimination, facets, programs
 from polytopes.kernel.sources import SOURCES
 
 _interior, _supports, _irredundant = programs.interior, programs.supports, facets.irredundant
-_pruned, _eliminate = elimination.pruned, elimination.eliminate
+_eliminate = elimination.eliminate
 
 
 def _compiled(sources: str) -> tuple[Any, ...]:
@@ -25,19 +26,14 @@ def _compiled(sources: str) -> tuple[Any, ...]:
     @njit(cache=True)
     def irredundant(AT, b, x0):
         sources  # noqa: B018
-        return _irredundant(AT, b, x0)
+        return _irredundant(AT, b, x0, np.zeros(b.size, np.int64))
 
     @njit(cache=True)
-    def pruned(table, inner):
+    def eliminate(table, known, left, columns, inner, max_rows, cautious):
         sources  # noqa: B018
-        return _pruned(table, inner)
+        return _eliminate(table, known, left, columns, inner, max_rows, cautious)
 
-    @njit(cache=True)
-    def eliminate(table, left, columns, inner, max_rows, cautious):
-        sources  # noqa: B018
-        return _eliminate(table, left, columns, inner, max_rows, cautious)
-
-    return interior, supports, irredundant, pruned, eliminate
+    return interior, supports, irredundant, eliminate
 
 
-interior, supports, irredundant, pruned, eliminate = _compiled(SOURCES)
+interior, supports, irredundant, eliminate = _compiled(SOURCES)

@@ -22,8 +22,10 @@ from polytopes.kernel.simplex import (
     Matrix,
     Vector,
     ascend,
+    at_origin,
+    invert_basis,
     repair,
-    start,
+    slacks,
 )
 
 _TOLERANCE = 1e-12  # of a row's slack at the inner point: growth that counts as none
@@ -31,7 +33,9 @@ _CLEAR = 1e-9  # of the slack: beyond, no vertex need be found (Harris' toleranc
 _BELOW = 1e-10  # violation, of the slack, that a point clearly outside a row may have of the others
 _FLAT_ROW = 1e-6  # steepest entry of a row, of one elsewhere, below which a ray may be an effect of rounding
 _CLARKSON_FROM = 24  # rows; below, one program per row is faster
-_WALK_UP_TO = 64  # rows; beyond, the programs over facets alone cost less than further steps among all rows
+_TOGETHER = 1e-9  # of the distance along a ray: two rows met this near each other
+_CORNERS = 256  # vertices at which later programs may begin; a longer list costs more than it saves
+_FRESH = 4  # programs that may pass a basis on before its inverse is computed anew
 _SPLIT = 134217729.0  # 2^27 + 1, halves a float (Dekker 1971)
 _NO, _YES, _DOUBT = 0, 1, 2
 
@@ -60,24 +64,23 @@ def _precise_slack(AT: Matrix, b: Vector, x: Vector, i: int) -> float:
 def centred(AT: Matrix, b: Vector, x0: Vector) -> tuple[Matrix, Vector, bool]:
     """The rows seen from x0, both scaled as above; False if x0 is not strictly inside."""
     d, m = AT.shape
-    rows, rhs = np.empty((d, m)), np.empty(m)
+    rows, rhs, value, terms = np.empty((d, m)), np.empty(m), b.copy(), np.abs(b)
+    for j in range(d):
+        for i in range(m):
+            part = AT[j, i] * x0[j]
+            value[i] -= part
+            terms[i] += abs(part)
     for i in range(m):
-        value, terms = b[i], abs(b[i])
-        for j in range(d):
-            value -= AT[j, i] * x0[j]
-            terms += abs(AT[j, i] * x0[j])
-        if (d + 2) * EPS * terms > 1e-14 * value:
-            value = _precise_slack(AT, b, x0, i)
-        if value <= 0.0:
+        if (d + 2) * EPS * terms[i] > 1e-14 * value[i]:
+            value[i] = _precise_slack(AT, b, x0, i)
+        if value[i] <= 0.0:
             return rows, rhs, False
-        slack, exponent = math.frexp(value)
-        rhs[i] = slack
-        factor = math.ldexp(1.0, -exponent)
-        for j in range(d):
-            rows[j, i] = AT[j, i] * factor
+        rhs[i], exponent = math.frexp(value[i])
+        value[i] = math.ldexp(1.0, -exponent)
     for j in range(d):
         steepest = 0.0
         for i in range(m):
+            rows[j, i] = AT[j, i] * value[i]
             steepest = max(steepest, abs(rows[j, i]))
         if steepest > 0.0:
             factor = math.ldexp(1.0, -math.frexp(steepest)[1])
@@ -115,11 +118,18 @@ def _even(AT: Matrix) -> bool:
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def _exceeds(AT: Matrix, b: Vector, c: Vector, slack: float, x: Vector, origin: Vector) -> int:
-    """Whether ``c'x`` exceeds ``(1 + 1e-12) slack`` in the centred set; x is such a point unless it is unbounded."""
+def _exceeds(AT: Matrix, b: Vector, c: Vector, slack: float, x: Vector, W: Index, Q: Matrix) -> int:
+    """Whether ``c'x`` exceeds ``(1 + 1e-12) slack`` in the centred set.
+
+    The ascent begins at the basis W with inverse Q and its point x, and leaves those where it ended: a point that does
+    exceed it, or an optimum.
+    """
     d, m = AT.shape
-    s, y, W, Q = np.empty(m), np.empty(d), np.empty(d, np.int64), np.empty((d, d))
-    start(AT, b, origin, x, s, W, Q)
+    s, y = np.empty(m), np.empty(d)
+    slacks(AT, b, x, s)
+    for k in range(d):
+        if W[k] >= 0:
+            s[W[k]] = 0.0
     status = ascend(AT, b, c, x, s, W, Q, y, 1.0, slack * (1.0 + _CLEAR))
     if status == STOPPED:
         return _YES if s.min() > -_BELOW else _DOUBT  # a row whose rate was masked may lie behind
@@ -129,12 +139,13 @@ def _exceeds(AT: Matrix, b: Vector, c: Vector, slack: float, x: Vector, origin: 
         return _YES if _even(AT) else _DOUBT
     if status != OPTIMAL:
         return _DOUBT
-    bound = 0.0
+    bound, value = 0.0, 0.0
     for k in range(d):
+        value += c[k] * x[k]
         if W[k] >= 0:
             bound += y[k] * b[W[k]]
-    if bound + _rounding(AT, b, c, x, W, y) < slack * (1.0 - _CLEAR):  # by duality
-        return _NO
+    if abs(bound - value) < _CLEAR * slack and bound + _rounding(AT, b, c, x, W, y) < slack * (1.0 - 2.0 * _CLEAR):
+        return _NO  # by duality
     if repair(AT, b, x, s, W, Q, y, 1.0) != OPTIMAL:
         return _DOUBT
     over = -slack * (1.0 + _TOLERANCE)
@@ -149,12 +160,14 @@ def _one_by_one(AT: Matrix, b: Vector, asked: Index) -> tuple[Index, Index]:
     """One program per row that is asked for, against all rows still kept, that row relaxed."""
     d, m = AT.shape
     keep, doubtful = np.ones(m, np.int64), np.zeros(m, np.int64)
-    relaxed, x, c, origin = b.copy(), np.empty(d), np.empty(d), np.zeros(d)
+    relaxed, x, c = b.copy(), np.empty(d), np.empty(d)
+    W, Q = np.empty(d, np.int64), np.empty((d, d))
     for i in np.flatnonzero(asked):
         relaxed[i] = b[i] + 1.0
         for j in range(d):
             c[j] = AT[j, i]
-        answer = _exceeds(AT, relaxed, c, b[i], x, origin)
+        at_origin(x, W, Q)
+        answer = _exceeds(AT, relaxed, c, b[i], x, W, Q)
         relaxed[i] = b[i]
         if answer == _NO:
             keep[i] = 0
@@ -165,99 +178,69 @@ def _one_by_one(AT: Matrix, b: Vector, asked: Index) -> tuple[Index, Index]:
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def _first_hit(AT: Matrix, b: Vector, p: Vector) -> tuple[int, bool]:
-    """Row that the ray from the origin along p meets first (-1: none), and whether another is met about there."""
-    d, m = AT.shape
-    row, first, second = -1, np.inf, np.inf
-    for i in range(m):
-        rate = 0.0
-        for j in range(d):
-            rate += AT[j, i] * p[j]
-        if rate * first > b[i]:
-            row, first, second = i, b[i] / rate, first
-        elif rate * second > b[i]:
-            second = b[i] / rate
-    return row, second <= first * (1.0 + 1e-9)
+def _first_hit(AT: Matrix, reach: Vector, p: Vector, rate: Vector) -> tuple[int, bool]:
+    """Row that the ray from the origin along p meets first (-1: none), and whether another is met about there.
 
-
-@njit(error_model="numpy", fastmath=FAST)
-def _walk(AT: Matrix, b: Vector, i: int, state: Index, basis: Matrix, s: Vector) -> None:
-    """Mark as kept the rows that a walk from the origin towards row i meets, each alone: they are facets.
-
-    It goes along the row's normal, then within the facets it has met, as long as the next one is met by itself.
+    `reach` holds the reciprocals of the slacks; `rate` is overwritten.
     """
     d, m = AT.shape
-    p = np.empty(d)
-    for q in range(m):
-        s[q] = b[q]
-    for met in range(d if m <= _WALK_UP_TO else 1):
-        length = 0.0
-        for j in range(d):
-            p[j] = AT[j, i]
-            length += p[j] * p[j]
-        for k in range(met):
-            along = 0.0
-            for j in range(d):
-                along += p[j] * basis[k, j]
-            for j in range(d):
-                p[j] -= along * basis[k, j]
-        square = 0.0
-        for j in range(d):
-            square += p[j] * p[j]
-        if square <= 1e-6 * length:
-            return
-        row, step, second = -1, np.inf, np.inf
-        for q in range(m):
-            rate = 0.0
-            for j in range(d):
-                rate += AT[j, q] * p[j]
-            if rate * step > s[q]:
-                row, step, second = q, s[q] / rate, step
-            elif rate * second > s[q]:
-                second = s[q] / rate
-        if row < 0 or second <= step * (1.0 + 1e-6) or step <= 0.0:
-            return
-        state[row] = 1
-        if row == i:
-            return
-        for q in range(m):
-            rate = 0.0
-            for j in range(d):
-                rate += AT[j, q] * p[j]
-            s[q] -= step * rate
-        s[row] = np.inf  # the walk stays on it
-        square = 0.0
-        for j in range(d):
-            basis[met, j] = AT[j, row]
-        for k in range(met):
-            along = 0.0
-            for j in range(d):
-                along += basis[met, j] * basis[k, j]
-            for j in range(d):
-                basis[met, j] -= along * basis[k, j]
-        for j in range(d):
-            square += basis[met, j] * basis[met, j]
-        if square <= 1e-6:
-            return
-        inverse = 1.0 / np.sqrt(square)
-        for j in range(d):
-            basis[met, j] *= inverse
+    for i in range(m):
+        rate[i] = AT[0, i] * p[0]
+    for j in range(1, d):
+        pj = p[j]
+        for i in range(m):
+            rate[i] += AT[j, i] * pj
+    steepest = 0.0
+    for i in range(m):
+        rate[i] *= reach[i]
+        steepest = max(steepest, rate[i])
+    if steepest <= 0.0:
+        return -1, True
+    row, met, least = -1, 0, steepest * (1.0 - _TOGETHER)
+    for i in range(m):
+        met += 1 if rate[i] >= least else 0
+    for i in range(m):
+        if rate[i] == steepest:
+            row = i
+            break
+    return row, met > 1
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def _clarkson(AT: Matrix, b: Vector) -> tuple[Index, Index]:
+def _best_corner(corners: Matrix, count: int, c: Vector) -> int:
+    """The stored vertex that is farthest along c (-1: none is farther than the origin)."""
+    best, farthest = -1, 0.0
+    for k in range(count):
+        value = 0.0
+        for j in range(c.shape[0]):
+            value += corners[k, j] * c[j]
+        if value > farthest:
+            best, farthest = k, value
+    return best
+
+
+@njit(error_model="numpy", fastmath=FAST)
+def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
     """Programs only over rows already known to be facets; a violation finds a new facet by a ray (Clarkson 1994).
 
-    Doubtful rows were not proved to be facets: a ray met several rows at once, or a program did not settle it.
+    Each program begins at the vertex, of those where earlier ones ended, that is farthest along its row.  Doubtful rows
+    were not proved to be facets: a ray met several rows at once, or a program did not settle it.
     """
     d, m = AT.shape
-    state = np.zeros(m, np.int64)  # 0 open, 1 kept, 2 redundant
+    state = known.copy()  # 0 open, 1 kept, 2 redundant
     doubtful = np.zeros(m, np.int64)
-    c, x, origin = np.empty(d), np.empty(d), np.zeros(d)
-    basis, s = np.empty((d, d)), np.empty(m)
+    c, x, W, Q = np.empty(d), np.empty(d), np.empty(d, np.int64), np.empty((d, d))
+    reach, rate, work = 1.0 / b, np.empty(m), np.empty((d, 2 * d))
+    tries = 2 * d  # rays are worth their while as long as most of them find a facet
     for i in range(m):
-        if state[i] == 0:
-            _walk(AT, b, i, state, basis, s)
+        if state[i] == 0 and tries > 0:
+            c[:] = AT[:, i]
+            row, tie = _first_hit(AT, reach, c, rate)
+            if tie or state[row] != 0:
+                tries -= 1
+            else:
+                state[row] = 1
+                tries += 1
     facets, values = np.empty((d, m)), np.empty(m)
     n = 0
     for i in range(m):
@@ -266,17 +249,33 @@ def _clarkson(AT: Matrix, b: Vector) -> tuple[Index, Index]:
             values[n] = b[i]
             n += 1
     system, rhs = np.ascontiguousarray(facets[:, :n]), values[:n].copy()
+    room = min(m, _CORNERS)
+    corners, bases, inverses = np.empty((room, d)), np.empty((room, d), np.int64), np.empty((room, d, d))
+    ages, count = np.zeros(room, np.int64), 0
     for i in range(m):
+        if state[i] != 0:
+            continue
         for j in range(d):
             c[j] = AT[j, i]
         while state[i] == 0:
-            answer = _exceeds(system, rhs, c, b[i], x, origin)
+            begin, age = _best_corner(corners, count, c), 0
+            if begin < 0:
+                at_origin(x, W, Q)
+            else:
+                x[:], W[:], Q[:, :] = corners[begin], bases[begin], inverses[begin]
+                age = ages[begin]
+            answer = _exceeds(system, rhs, c, b[i], x, W, Q)
             if answer == _NO:
                 state[i] = 2
+                new = count < room and (begin < 0 or (bases[begin] != W).any())
+                if new and (age < _FRESH or invert_basis(system, W, Q, work)):
+                    corners[count], bases[count], inverses[count] = x, W, Q
+                    ages[count] = age + 1 if age < _FRESH else 0
+                    count += 1
                 continue
             row, tie = i, True
             if answer == _YES:
-                row, tie = _first_hit(AT, b, x)
+                row, tie = _first_hit(AT, reach, x, rate)
             if tie or row < 0 or state[row] != 0:
                 row = i
                 doubtful[i] = 1
@@ -285,6 +284,14 @@ def _clarkson(AT: Matrix, b: Vector) -> tuple[Index, Index]:
             values[n] = b[row]
             n += 1
             system, rhs = np.ascontiguousarray(facets[:, :n]), values[:n].copy()
+            for k in range(count - 1, -1, -1):  # vertices beyond the new facet are none
+                value = 0.0
+                for j in range(d):
+                    value += corners[k, j] * AT[j, row]
+                if value > b[row]:
+                    count -= 1
+                    corners[k], bases[k] = corners[count], bases[count]
+                    inverses[k], ages[k] = inverses[count], ages[count]
     keep = np.zeros(m, np.int64)
     for i in range(m):
         keep[i] = 1 if state[i] == 1 else 0
@@ -320,7 +327,7 @@ def _distinct(AT: Matrix, b: Vector) -> Index:
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def irredundant(AT: Matrix, b: Vector, x0: Vector) -> tuple[Index, Index]:
+def irredundant(AT: Matrix, b: Vector, x0: Vector, known: Index) -> tuple[Index, Index]:
     """Numbers of a minimal set of rows, and for each whether it is doubtful; Clarkson's method if there are many rows.
 
     Parameters
@@ -329,6 +336,8 @@ def irredundant(AT: Matrix, b: Vector, x0: Vector) -> tuple[Index, Index]:
         Rows without zero rows, transposed.
     x0 : array (d,)
         A point strictly inside; if rounding cannot tell that it is, every row is doubtful.
+    known : array (m,) of int
+        1 for rows that are facets for sure.
 
     Returns
     -------
@@ -339,9 +348,9 @@ def irredundant(AT: Matrix, b: Vector, x0: Vector) -> tuple[Index, Index]:
     rows, rhs, inside = centred(AT[:, chosen], b[chosen], x0)
     if not inside:
         return chosen, np.ones(chosen.size, np.int64)
-    asked = np.ones(chosen.size, np.int64)
+    asked = 1 - known[chosen]
     if chosen.size >= _CLARKSON_FROM:
-        keep, doubtful = _clarkson(rows, rhs)
+        keep, doubtful = _clarkson(rows, rhs, known[chosen])
         kept = np.flatnonzero(keep)
         if not doubtful.any():
             return chosen[kept], doubtful[kept]

@@ -9,7 +9,7 @@ from polytopes.kernel.simplex import AMBIGUOUS, FAST, LIMIT, Index, Matrix, Vect
 @njit(error_model="numpy", fastmath=FAST)
 def interior(
     AT: Matrix, b: Vector, norms: Vector, x0: Vector, cap: float
-) -> tuple[Vector, float, int, Index, Vector]:
+) -> tuple[Vector, float, int, Vector]:
     """Largest ball ``a_i'x + |a_i| r <= b_i`` with ``r <= cap``.
 
     Parameters
@@ -25,10 +25,9 @@ def interior(
 
     Returns
     -------
-    x, r, status, active, multipliers
-        Centre (d,), radius (negative if the rows have no common point), status, the d + 1 active rows (m stands for
-        the cap, negative for an artificial row) and their multipliers.  With r < 0 the multipliers combine the rows to
-        ``0'x <= r``: Farkas' multipliers.
+    x, r, status, multipliers
+        Centre (d,), radius (negative if the rows have no common point), status, and multipliers of the rows (m,).
+        With r < 0 they combine the rows to ``0'x <= r``: Farkas' multipliers.
     """
     d, m = AT.shape
     lifted = np.empty((d + 1, m + 1))
@@ -52,7 +51,11 @@ def interior(
     c = np.zeros(d + 1)
     c[d] = 1.0
     status = optimise(lifted, rhs, c, x, s, W, Q, y, scale_of(b))
-    return x[:d].copy(), float(x[d]), status, W, y
+    weights = np.zeros(m)
+    for k in range(d + 1):
+        if 0 <= W[k] < m:
+            weights[W[k]] = y[k]
+    return x[:d].copy(), float(x[d]), status, weights
 
 
 @njit(error_model="numpy", fastmath=FAST)

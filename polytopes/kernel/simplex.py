@@ -63,7 +63,7 @@ def _settle(AT: Matrix, b: Vector, x: Vector, s: Vector, W: Index, Q: Matrix) ->
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def _invert_basis(AT: Matrix, W: Index, Q: Matrix, work: Matrix) -> bool:
+def invert_basis(AT: Matrix, W: Index, Q: Matrix, work: Matrix) -> bool:
     """Q = inverse of the active rows, transposed (Gauss-Jordan, partial pivoting); False if singular."""
     d = W.shape[0]
     for k in range(d):
@@ -230,7 +230,7 @@ def ascend(
         age += 1
         if age >= _REFACTOR:
             age = 0
-            if not _invert_basis(AT, W, Q, work):
+            if not invert_basis(AT, W, Q, work):
                 return LIMIT
             _settle(AT, b, x, s, W, Q)
     return LIMIT
@@ -251,7 +251,7 @@ def repair(AT: Matrix, b: Vector, x: Vector, s: Vector, W: Index, Q: Matrix, y: 
             worst = min(worst, s[i])
         if worst >= -64.0 * EPS * reach:
             return OPTIMAL
-        if attempt == d and not _invert_basis(AT, W, Q, work):
+        if attempt == d and not invert_basis(AT, W, Q, work):
             return LIMIT
         row = 0
         while s[row] != worst:
@@ -287,14 +287,21 @@ def optimise(
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def start(AT: Matrix, b: Vector, x0: Vector, x: Vector, s: Vector, W: Index, Q: Matrix) -> None:
-    """State at the feasible point x0: every slot artificial."""
-    d = AT.shape[0]
+def at_origin(x: Vector, W: Index, Q: Matrix) -> None:
+    """Point and basis at the origin: every slot artificial."""
+    d = x.shape[0]
     Q[:, :] = 0.0
     for j in range(d):
-        x[j] = x0[j]
+        x[j] = 0.0
         W[j] = -1 - j
         Q[j, j] = 1.0
+
+
+@njit(error_model="numpy", fastmath=FAST)
+def start(AT: Matrix, b: Vector, x0: Vector, x: Vector, s: Vector, W: Index, Q: Matrix) -> None:
+    """State at the feasible point x0: every slot artificial."""
+    at_origin(x, W, Q)
+    x[:] = x0
     slacks(AT, b, x, s)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from svo.comparison.table import ComparisonRow
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = {"bounded": "#0072B2", "gaussian": "#D55E00"}  # Okabe and Ito
-OFFSETS = {"bounded": 0.16, "gaussian": -0.16}
+_APART = {"bounded": -0.16, "gaussian": 0.16}  # lines of a detector with both kinds of noise
 _GRID = "#D9DDE2"
 
 
@@ -40,12 +40,14 @@ def plot_comparison(rows: Sequence[ComparisonRow], rate: float, Ts: float, longe
         1, len(scenarios) + 1, figsize=(2.6 + 1.75 * (len(scenarios) + 1), height), sharey=True, squeeze=False
     )
     never = 2.2 * longest
+    both = len({row.distribution for row in rows}) > 1
+    offsets = {name: apart if both else 0.0 for name, apart in _APART.items()}
     for ax, scenario in zip(axes[0], scenarios, strict=False):
         for row in rows:
             if (row.fault, row.profile) == scenario:
-                _delays(ax, detectors.index(row.detector), row, Ts, never)
+                _delays(ax, detectors.index(row.detector) + offsets[row.distribution], row, never)
         _time_axis(ax, f"{scenario[0]}, {scenario[1]}", Ts, never)
-    _false_alarms(axes[0][-1], detectors, rows, rate)
+    _false_alarms(axes[0][-1], detectors, rows, rate, offsets)
     first = axes[0][0]
     first.set_yticks(range(len(detectors)), detectors)
     first.set_ylim(len(detectors) - 0.5, -0.5)
@@ -55,8 +57,8 @@ def plot_comparison(rows: Sequence[ComparisonRow], rate: float, Ts: float, longe
     return figure
 
 
-def _delays(ax: Axes, line: int, row: ComparisonRow, Ts: float, never: float) -> None:
-    y, colour = line - OFFSETS[row.distribution], COLOURS[row.distribution]
+def _delays(ax: Axes, y: float, row: ComparisonRow, never: float) -> None:
+    colour = COLOURS[row.distribution]
     if row.detect.p05 is not None:
         end = never if row.detect.p95 is None else row.detect.p95
         ax.plot([row.detect.p05, end], [y, y], color=colour, linewidth=1.4, solid_capstyle="butt", zorder=2)
@@ -78,10 +80,12 @@ def _time_axis(ax: Axes, title: str, Ts: float, never: float) -> None:
     ax.set_axisbelow(True)
 
 
-def _false_alarms(ax: Axes, detectors: Sequence[str], rows: Sequence[ComparisonRow], rate: float) -> None:
+def _false_alarms(
+    ax: Axes, detectors: Sequence[str], rows: Sequence[ComparisonRow], rate: float, offsets: Mapping[str, float]
+) -> None:
     shares = {(row.detector, row.distribution): row.false_alarms for row in rows}
     for (detector, distribution), share in shares.items():
-        y = detectors.index(detector) - OFFSETS[distribution]
+        y = detectors.index(detector) + offsets[distribution]
         low, high = share.interval
         ax.plot([100 * low, 100 * high], [y, y], color=COLOURS[distribution], linewidth=1.4)
         ax.plot(100 * share.value, y, "o", color=COLOURS[distribution], markersize=5, clip_on=False)

@@ -10,13 +10,13 @@ from collections.abc import Callable
 import numpy as np
 import ppl
 import pytest
-from exact_sets import minimal_size, polyhedron, shadow, within
+from exact_sets import minimal_size, polyhedron, shadow, supports, within
 from integer_systems import KINDS, many, system
 
 from polytopes import HPolytope, convex_hull
 from polytopes.projection import METHODS
 
-AMOUNT = pytest.mark.parametrize("count", [150, pytest.param(1500, marks=pytest.mark.slow)])
+AMOUNT = pytest.mark.parametrize("count", [150, pytest.param(1400, marks=pytest.mark.slow)])
 EVERY = pytest.mark.parametrize("kind", KINDS)
 Operation = Callable[[str, np.random.Generator, HPolytope], None]
 
@@ -39,11 +39,13 @@ def other(rng: np.random.Generator, kind: str, P: HPolytope) -> HPolytope:
 @AMOUNT
 @EVERY
 def test_emptiness_redundancy_and_dimension(kind: str, count: int) -> None:
-    for case, _, P in many(kind, 2 * count, (1, 2, 3, 4)):
+    for case, rng, P in many(kind, 2 * count, (1, 2, 3, 4)):
         exact = polyhedron(P)
         assert_exact(P, exact, case)
         assert P.affine_dim() == (-1 if exact.is_empty() else exact.affine_dimension()), case
         assert P.is_bounded() == exact.is_bounded(), case
+        c = rng.integers(-4, 5, (6, P.dim))
+        np.testing.assert_allclose(P.support(c), supports(exact, c), atol=1e-9, err_msg=case)
         proof = P.emptiness().certificate
         assert (proof is not None and proof.verify(P)) == exact.is_empty(), case
 

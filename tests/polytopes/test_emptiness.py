@@ -141,8 +141,8 @@ def test_a_failed_solver_is_never_an_empty_set(monkeypatch: pytest.MonkeyPatch) 
     interior = kernel.interior
 
     def failing(*arguments: np.ndarray) -> tuple:
-        x, _, _, active, y = interior(*arguments)
-        return x + 100.0, -1.0, kernel.LIMIT, active, y
+        x, _, _, weights = interior(*arguments)
+        return x + 100.0, -1.0, kernel.LIMIT, weights
 
     def silent(self: HighsProgram, c: np.ndarray) -> HighsOutcome:
         return HighsOutcome("infeasible", float("nan"), np.empty(0), np.empty(0))

@@ -76,6 +76,13 @@ def test_an_equality_stays_an_equality() -> None:
         assert Q.affine_dim() == Q.dim - 1
 
 
+def test_a_flat_set_by_opposite_rows_is_as_unbounded_as_it_is() -> None:
+    """Slacks of zero say nothing about its other widths."""
+    P = HPolytope([[0, 2, -2], [-2, -2, 2], [0, -2, 2], [2, 2, -2]], [3, -6, -2, 6])
+    assert P.affine_dim() == 2
+    np.testing.assert_array_equal(P.support([[1, -2, -1], [0, 1, 1], [0, 2, -2], [1, 1, -1]]), [np.inf, np.inf, 3, 3])
+
+
 def test_emptiness_is_decided_on_every_kind_of_set_and_its_proof_stands_alone() -> None:
     for name, P in CATALOGUE.items():
         answer = P.emptiness()

@@ -115,6 +115,28 @@ def test_thin_sets_by_elimination_and_redundancy(span: float) -> None:
         assert minimal.b.size <= minimal_size(inner)[0]
 
 
+@pytest.mark.parametrize("width", [1e-6, 1e-7, 1e-8])
+def test_skew_slabs_through_their_vertices_keep_their_width(width: float) -> None:
+    """Every operation is right to 1e-6 of the width, in the directions of all its own rows."""
+    for trial in range(12):
+        rng = np.random.default_rng([9, trial])
+        n = int(rng.integers(2, 4))
+        A, b, _ = uneven_set(rng, n, 0.0, width)
+        P, Q = HPolytope(A, b), HPolytope(*uneven_set(rng, n, 0.0)[:2])
+        small = HPolytope(Q.A, Q.b * 2.0 ** np.round(np.log2(width)))
+        keep = rng.permutation(n)[: int(rng.integers(1, n))].tolist()
+        hull = polyhedron(P)
+        hull.poly_hull_assign(polyhedron(small))
+        expected = {"sum": exact_sum(P, small), "hull": hull}
+        for name, task in operations(P, small, keep).items():
+            exact = expected.get(name) or (shadow(P, keep) if "projection" in name else polyhedron(P))
+            result = task()
+            directions = np.vstack([result.A[:20], -result.A[:20]])
+            for c, value in zip(directions, result.support(directions), strict=True):
+                upper, lower = exact_support(exact, c), -exact_support(exact, -c)
+                assert abs(Fraction(float(value)) - upper) <= 1e-6 * (upper - lower), (name, trial)
+
+
 def test_qhull_never_reaches_the_user_with_an_error_of_its_own() -> None:
     """Thin sets through their vertices: a hull that holds them all, or an error that says what is undecided."""
     for trial in range(60):

@@ -1,0 +1,120 @@
+"""A window in the kernel's memory: its sizes, its arrays, what the certificate of its multipliers is made of."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.model import UncertainModel
+from svo.observers import window_kernel as kernel
+from svo.observers.output_injection import OutputInjection, can_inject
+from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
+from svo.observers.sign_split import SplitCertificate
+from svo.observers.window_setup import (
+    channel_owners,
+    jitter,
+    joint_rows,
+    output_is_disturbed,
+)
+
+Array = NDArray[np.float64]
+_GROWING_START = 16
+_LARGEST_BASIS = 128
+_LARGEST_GROWING_BASIS = 256
+
+
+class WindowMemory:
+    """Arrays of a window, anchored at a set of first states, and what is fixed of its model.
+
+    Attributes
+    ----------
+    model : UncertainModel
+    horizon : int or None
+    eps : float
+    sign_split : int
+        As in `svo.WindowObserver`.
+    """
+
+    def _configure(
+        self, model: UncertainModel, horizon: int | None, template: Array, eps: float, sign_split: int
+    ) -> None:
+        self.model = model
+        self.sign_split = sign_split
+        self.horizon = None if horizon is None else int(horizon)
+        self.eps = float(eps)
+        self._block = 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
+        self._template = template
+        self._owner = channel_owners(model)
+        self._late = output_is_disturbed(model)
+        sizes = model.n_states, model.n_inputs, model.n_disturbances
+        self._injection = OutputInjection(*sizes) if can_inject(model) else None
+        # Channels that the output may share are bounded at its sample, so what u says of them must be known then.
+        driven = any(callable(u.B) or (u.B is not None and bool(np.any(u.B))) for u in model.uncertainties)
+        self._wants_next_input = model.uses_input_in_output or (self._late and driven)
+
+    @property
+    def _first_steps(self) -> int:
+        """Steps that an empty window has room for."""
+        return _GROWING_START if self.horizon is None else self.horizon + self._block - 1
+
+    def _begin(self, initial: ArrivalSet, steps: int) -> None:
+        """An empty window of so many steps at most, anchored at the first states."""
+        self._initial = initial
+        self._allocate(steps)
+        n, w = self.model.n_states, self._arrays
+        w["h_lower"][:n], w["h_upper"][:n] = initial.box_lower, initial.box_upper
+        kernel.initialise(self._window, self._size, initial.rows, initial.lower, initial.upper)
+        self._falsified: WindowCertificate | SplitCertificate | None = None
+        self._last_bounds: tuple[Array, Array] | None = None
+
+    def _allocate(self, steps: int) -> None:
+        model, polytope = self.model, self.model.disturbance_polytope
+        n = model.n_states
+        nw = model.n_disturbances + (0 if self._injection is None else n)
+        w_rows = joint_rows(polytope) if polytope is not None else (np.zeros((0, nw)), np.zeros(0), np.zeros(0))
+        nv, nr = nw + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
+        na = max(len(self._template), len(self._initial.rows))
+        rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
+        largest = _LARGEST_BASIS if self.horizon is not None else _LARGEST_GROWING_BASIS
+        self._size = kernel.Sizes(
+            n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
+            nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps, block=self._block,
+            K=min(rows, columns, largest) + 2, late=int(self._late),
+        )  # fmt: skip
+        w = self._arrays = kernel.allocate(self._size)
+        w["T"][:n] = np.eye(n)
+        w["T"][n:] = self._template
+        w["owner"][:] = self._owner
+        w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
+        w["w_rows"][:], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
+        w["jitter"][:] = jitter(w["jitter"].size)
+        self._window = kernel.new_window(dict(w))
+        if self._injection is not None:
+            w |= self._injection.allocate(self._size)
+
+    def _grow(self) -> None:
+        """Twice the room; nothing has wrapped around yet, so every array is a leading block of the larger one."""
+        old = self._arrays
+        self._allocate(2 * self._size.N)
+        for name, small in old.items():
+            self._arrays[name][tuple(slice(0, length) for length in small.shape)] = small
+
+    @property
+    def _time(self) -> int:
+        return int(self._arrays["clock"][kernel.TIME])
+
+    @property
+    def _started(self) -> bool:
+        return bool(self._arrays["clock"][kernel.STARTED])
+
+    def _arrival(self) -> ArrivalSet:
+        if self._arrays["clock"][kernel.BASE] == 0:
+            return self._initial
+        n, lower, upper = self.model.n_states, self._arrays["h_lower"].copy(), self._arrays["h_upper"].copy()
+        return ArrivalSet(lower[:n], upper[:n], self._template, lower[n:], upper[n:])
+
+    def _certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
+        """Of the multipliers at hand, about the model and the data as given."""
+        if self._injection is not None:
+            return self._injection.certificate(self._arrays, self._size, self._arrival(), objective)
+        return certificate_of(self._arrays, self._size, self._arrival())

@@ -1,0 +1,184 @@
+"""Samples that enter a window, and the programs that decide whether it is empty and bound its states."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.observers import window_kernel as kernel
+from svo.observers.fallback import candidates, is_feasible
+from svo.observers.sign_split import SplitPrograms
+from svo.observers.step import VerdictName
+from svo.observers.window_memory import WindowMemory
+
+Array = NDArray[np.float64]
+_PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
+ENTRY_ERRORS = {
+    kernel.BAD_INPUT: "u is {u}; expected finite numbers",
+    kernel.BAD_OUTPUT: "y is {y}; expected finite numbers, or NaN for a missing sensor",
+    kernel.BAD_MATRIX: "the model's matrices at this schedule contain NaN or Inf; expected finite numbers",
+    kernel.RANK_ROSE: "an uncertainty has a higher rank at this sample than at the model's typical schedule",
+}
+
+
+class WindowPrograms(WindowMemory):
+    """Verdicts about a window. "Falsified" is kept, with the proof that was checked."""
+
+    def _take(self, data: tuple[Any, ...]) -> VerdictName:
+        """One sample with all its programs, in one compiled call unless the window seems empty."""
+        if self.sign_split or self._injection is not None:
+            self._enter(data)
+            return self._solve(kernel.ARRIVAL)
+        code, verdict, program = kernel.take(*data, self.eps, kernel.PIVOT_LIMIT)
+        self._check_entry(code, data)
+        if verdict == kernel.CONSISTENT:
+            return "consistent"
+        return self._conclude(kernel.ARRIVAL, verdict, program)
+
+    def _enter(self, data: tuple[Any, ...], end: float | None = None) -> None:
+        """One sample without its programs, but for those of its channels, which stop at the time ``end``."""
+        injected, given = False, data
+        if self._injection is not None:
+            data, injected = self._inject(data)
+        code = kernel.enter(*data)
+        self._check_entry(code, given)
+        w, s = self._arrays, self._time % (self._size.N + 1)
+        if self._injection is not None:  # it is for outputs that w enters, where the clock has moved on by now
+            w["given.stack"][s], w["given.y"][s], w["given.injected"][s] = given[6], given[5], injected
+            w["given.slack"][s] = 0.0
+        if end is None:
+            self._settle_channels(code == kernel.SIGN_OPEN)
+        elif code == kernel.SIGN_OPEN:
+            v = self._time % (self._size.N + self._size.late)
+            for program in range(2 * self._size.nq):
+                if w["s_lower"][v, program // 2] < 0.0 < w["s_upper"][v, program // 2]:
+                    self._solve_in_portions(kernel.CHANNELS, program, end)
+        if injected:
+            self._widen(given)
+        kernel.complete(*data[:3], self.eps)
+        if self._injection is not None and not injected:
+            w["given.slack"][s] = w["slack"][s]
+
+    def _inject(self, data: tuple[Any, ...]) -> tuple[tuple[Any, ...], bool]:
+        """A sample's data with w injected where y is complete."""
+        assert self._injection is not None
+        *head, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper = data
+        stack, y, noise, injected = self._injection.transform(stack, y, (w_lower, w_upper))
+        none = np.zeros(self.model.n_states)
+        bounds = (np.concatenate([b, none]) for b in (w_old_lower, w_old_upper, w_lower, w_upper))
+        return (*head, y, stack, noise, *bounds), injected
+
+    def _widen(self, given: tuple[Any, ...]) -> None:
+        """Bounds of what the injection leaves to the state and to the box of w, by what is known of the state."""
+        assert self._injection is not None
+        u, y, stack, w = given[4], given[5], given[6], given[10:12]
+        s, v = self._time % (self._size.N + 1), self._time % (self._size.N + self._size.late)
+        arrays, nw = self._arrays, self.model.n_disturbances
+        d, widening, slack = self._injection.widths(stack, y, u, arrays["mag"][s], w, self.eps)
+        arrays["w_lower"][v, nw:], arrays["w_upper"][v, nw:] = -d, d
+        arrays["noise"][s] += widening
+        arrays["given.slack"][s] = slack
+
+    @staticmethod
+    def _check_entry(code: int, data: tuple[Any, ...]) -> None:
+        if code in ENTRY_ERRORS:
+            raise ValueError(ENTRY_ERRORS[code].format(u=data[3], y=data[5]))
+
+    def _settle_channels(self, sign_open: bool) -> None:
+        """Tighten the bounds of those s whose sign is open."""
+        if sign_open:
+            self._solve(kernel.CHANNELS)
+
+    def _solve(self, task: int) -> VerdictName:
+        """Solve the programs of a task; an empty window counts only once its certificate is proven."""
+        if self.sign_split and task != kernel.CHANNELS:
+            split = SplitPrograms(self._arrays, self._window, self._size, self._certificate, self.sign_split)
+            if split.is_needed:
+                return self._solve_split(split, task)
+        verdict, program = kernel.solve(self._window, self._size, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
+        return self._conclude(task, verdict, program)
+
+    def _conclude(self, task: int, verdict: int, program: int) -> VerdictName:
+        """What the programs of a task say; those after one that found the window empty have yet to be solved."""
+        while verdict == kernel.EMPTY_CANDIDATE:
+            if task == kernel.ARRIVAL and self._prove():
+                return "falsified"
+            after = program + 1
+            verdict, program = kernel.solve(self._window, self._size, task, after, kernel.ALL, kernel.PIVOT_LIMIT)
+        if verdict == kernel.CONSISTENT:
+            return "consistent"
+        return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
+
+    def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
+        """As `_solve`, each program over its cells."""
+        w, clock = self._arrays, self._arrays["clock"]
+        base, time = int(clock[kernel.BASE]), int(clock[kernel.TIME])
+        programs = {
+            kernel.ARRIVAL: range(*kernel.arrival_programs.py_func(self._size, base, time)),
+            kernel.NEWEST: range(2 * self._size.nt),
+            kernel.QUERY: range(1),
+        }[task]
+        prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
+        has_point = False
+        for program in programs:
+            sign = 1.0 - 2.0 * (program % 2)
+            target = w["answer"] if prefix is None else w[f"{prefix}_{'lower' if program % 2 else 'upper'}"]
+            at = 0 if prefix is None else program // 2
+            result = split.solve(task, program, lambda t=target, i=at, s=sign: float(s * t[i]))  # type: ignore[misc]
+            has_point = has_point or result.has_point
+            if result.proof is None:
+                target[at] = sign * result.value
+            elif task == kernel.ARRIVAL and result.proof.verify():
+                self._falsified = result.proof
+                return "falsified"
+        return "consistent" if has_point else "undecided"
+
+    def _solve_until(self, end: float) -> VerdictName:
+        """The arrival programs in small portions of pivots, until a time is reached."""
+        clock, decided = self._arrays["clock"], False
+        base, time = clock[kernel.BASE], clock[kernel.TIME]
+        for program in range(*kernel.arrival_programs.py_func(self._size, base, time)):
+            verdict = self._solve_in_portions(kernel.ARRIVAL, program, end)
+            if verdict == kernel.EMPTY_CANDIDATE and self._prove():
+                return "falsified"
+            decided = decided or verdict == kernel.CONSISTENT
+        if time - base == self._size.N:
+            clock[kernel.PENDING] = 1
+        return "consistent" if decided else "undecided"
+
+    def _solve_in_portions(self, task: int, program: int, end: float) -> int:
+        """One program, its pivots in portions until it is decided or the time ``end`` is reached."""
+        verdict, late, done = kernel.UNDECIDED, False, 0
+        while verdict == kernel.UNDECIDED and not late:
+            late = perf_counter() >= end or done >= kernel.PIVOT_LIMIT
+            portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
+            verdict, _ = kernel.solve(self._window, self._size, task, program, program + 1, portion)
+            done += portion
+        return int(verdict)
+
+    def _prove(self) -> bool:
+        """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
+        certificate = self._certificate()
+        if certificate.verify():
+            self._falsified = certificate
+        return self._falsified is not None
+
+    def _prove_again(self) -> None:
+        """The proof of a falsification, from the window alone."""
+        if self.sign_split:
+            self._solve(kernel.ARRIVAL)
+        if self._falsified is None:
+            self._falsified = self._certificate()
+
+    def _ask_highs(self) -> VerdictName:
+        w = self._arrays
+        feasible, ray = is_feasible(w["G"], w["lower"], w["upper"])
+        if feasible is False:
+            for multipliers in candidates(ray):
+                w["farkas"][:] = multipliers
+                if self._prove():
+                    return "falsified"
+        return "consistent" if feasible else "undecided"
