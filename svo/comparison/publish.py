@@ -25,12 +25,19 @@ def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[Comp
     rows = comparison_table(compared)
     write_table(out / "comparison.csv", rows)
     write_runs(out / "runs.csv", compared.rows)
-    longest = max(plant.duration(row.fault, row.profile) - fault_start(plant, row.fault, row.profile) for row in rows)
+    scenarios = {(row.fault, row.profile) for row in rows}
+    longest = max(_seconds_after(plant, *scenario, compared.comparison.noise) for scenario in scenarios)
     figure = plot_comparison(rows, compared.comparison.rate, plant.Ts, longest)
     figure.savefig(out / "comparison.png", dpi=130)
     if isinstance(plant, LearnsDetectors):
         write_run_figures(out, plant, compared.comparison.noise, compared.comparison.seed)
     return rows
+
+
+def _seconds_after(plant: Plant, fault: str, profile: str, noise: str) -> float:
+    """How long a run goes on from its fault on; a log need not begin at time zero."""
+    log = plant.simulate(fault, profile, noise, 0)
+    return float(log.time[-1]) + plant.Ts - fault_start(plant, fault, profile)
 
 
 def to_text(rows: Sequence[ComparisonRow]) -> str:

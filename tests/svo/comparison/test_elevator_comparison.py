@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from svo.cli import app
@@ -30,6 +31,19 @@ def test_the_paper_s_figures_are_drawn_beside_the_comparison(tmp_path: Path) -> 
     assert {path.name for path in tmp_path.glob("*.png")} == {
         "comparison.png", "run_faults.png", "run_healthy.png", "run_zoom.png"
     }  # fmt: skip
+
+
+def test_the_time_axis_reaches_from_one_sample_to_the_end_of_a_run_that_begins_late(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The missile's logs begin at 25 s of the flight, and its faults at 30 s."""
+    seen: list[float] = []
+    monkeypatch.setattr("svo.comparison.publish.plot_comparison", lambda *given: seen.extend(given[2:]) or Figure())
+    rows = [row("none", "none", None), row("propulsion", "step", 0.03)]
+    tuned = {("bounded", "interval, a = 0.9"): Tuned(Setting(1.25), 0.0, 1)}
+    compared = Compared(Comparison("missile", "bounded"), {"interval, a = 0.9": "threshold"}, tuned, rows)
+    publish_comparison(tmp_path, compared, load_plant("missile"))
+    assert seen == pytest.approx([0.01, 10.0])
 
 
 @pytest.mark.parametrize(
