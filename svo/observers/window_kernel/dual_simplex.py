@@ -385,7 +385,7 @@ def maximise(w, size, q, limit):
         # something where rows are long and their bounds wide: the same basis, factored and priced anew.
         w.clock[REFACTORED] += 1
         w.k[q] = eliminate(w, q, w.k[q], w.k[q], 1e-11)
-        if _optimise(w, q, limit) == OPTIMAL:
+        if _optimise(w, q, min(limit, REFACTOR)) == OPTIMAL:
             again, again_rounding = _outer_value(w, q, w.k[q])
             if again + again_rounding < value + rounding:
                 value, rounding = again, again_rounding
