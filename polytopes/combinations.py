@@ -101,30 +101,34 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     upper, lower = result.values[k : k + P.d.size], -result.values[k + P.d.size :]
     if (upper - lower > _CONSTANT * np.maximum(1.0, np.abs(upper))).any():
         return nothing(P.dim)
-    C, d = P.C.copy(), P.d - (upper + lower) / 2.0
-    rest = Rows(P.A, P.b - result.values[:k], C, d)
-    if _clear(rest.program):
-        return rest.A, rest.b, C, d
-    return *_moved_exactly(P, Q, rest), C, d
+    moved = P.A, P.b - result.values[:k], P.C.copy(), P.d - (upper + lower) / 2.0
+    if _clear(Rows(*moved).program, P.program.size):
+        return moved
+    return _moved_exactly(P, Q) or moved
 
 
-def _clear(program: Program) -> bool:
-    """Whether rounding of the right-hand sides changes neither emptiness nor dimension."""
+def _clear(program: Program, size: float) -> bool:
+    """Whether rounding of right-hand sides that were differences of numbers of a size changes nothing of the set."""
     nearest = abs(program.interior.radius) if program.consistent else 0.0
-    return program.fat or nearest > _ROUNDED * program.size
+    return nearest > _ROUNDED * max(program.size, size)
 
 
-def _moved_exactly(P: Rows, Q: Rows, rest: Rows) -> tuple[Floats, Floats]:
-    """The rows of P moved inward by the exact supports of Q, up to positive factors; those of `rest` if Q is large."""
-    point = exact_feasibility(Q.A, Q.b, Q.program.flat, Q.program.interior.point) if affordable(*Q.A.shape) else None
-    if point is None or point.status != "reached":
-        return rest.A, rest.b
-    table = np.column_stack([rest.A, rest.b])
-    for i, row in enumerate(P.A):
-        best = exact_maximum(Q.A, Q.b, Q.program.flat, row, point.point)
-        if best.status == "optimal":
-            table[i] = row_to_floats([*rational_vector(row), rational(P.b[i]) - best.value], ZERO)[:-1]
-    return table[:, :-1], table[:, -1]
+def _moved_exactly(P: Rows, Q: Rows) -> Table | None:
+    """The rows of P moved inward by the exact supports of Q, up to positive factors; None if that costs too much."""
+    start = exact_feasibility(Q.A, Q.b, Q.program.flat, Q.program.interior.point) if affordable(*Q.A.shape) else None
+    if start is None or start.status != "reached":
+        return None
+    k, m = P.b.size, P.d.size
+    found = [exact_maximum(Q.A, Q.b, Q.program.flat, row, start.point) for row in np.vstack([P.A, P.C, -P.C])]
+    if any(best.status != "optimal" for best in found):
+        return None
+    above, upper, lower = found[:k], found[k : k + m], found[k + m :]
+    sides = [best.value for best in above] + [(u.value - v.value) / 2 for u, v in zip(upper, lower, strict=True)]
+    rows, constants = np.vstack([P.A, P.C]), np.concatenate([P.b, P.d])
+    table = np.empty((k + m, P.dim + 1))
+    for i, side in enumerate(sides):
+        table[i] = row_to_floats([*rational_vector(rows[i]), rational(constants[i]) - side], ZERO)[:-1]
+    return table[:k, :-1], table[:k, -1], table[k:, :-1], table[k:, -1]
 
 
 def hull_of_union(sets: Sequence[Rows]) -> Table:

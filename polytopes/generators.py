@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from polytopes.affine import AffineSet, affine_set
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.exact import row_to_floats
-from polytopes.hull import normals_of_span
+from polytopes.hull import axis_scales, normals_of_span
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
 from polytopes.vertices import vertices
@@ -58,7 +58,25 @@ def generators(P: Rows) -> Generators:
 
 
 def rows_of_generators(V: Floats, rays: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Rows A, b, C, d of ``conv(V) + cone(rays)``: the generators of the cone of all rows that hold.
+    """Rows A, b, C, d of ``conv(V) + cone(rays)``, found in coordinates scaled by powers of two, which is exact."""
+    scale, lengths = _scales(V, rays)
+    A, b, C, d = _scaled_rows(V / scale, rays / scale / lengths[:, None])
+    return A / scale, b, C / scale, d
+
+
+def _scales(V: Floats, rays: Floats) -> tuple[Floats, Floats]:
+    """Powers of two near the widths along the axes, the rays taken to be about as long as the points are spread, and
+    near the lengths of the rays in such coordinates.
+    """
+    longest = np.abs(rays).max(axis=1, keepdims=True)
+    reach = rays / np.where(longest > 0.0, longest, 1.0) * (np.ptp(V, axis=0).max() or 1.0)
+    scale = axis_scales(np.vstack([V, V[0] + reach, V[0] - reach]))
+    lengths = np.abs(rays / scale).max(axis=1)
+    return scale, np.ldexp(1.0, np.frexp(np.where(lengths > 0.0, lengths, 1.0))[1])
+
+
+def _scaled_rows(V: Floats, rays: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """The generators of the cone of all rows that hold.
 
     Points and rays within 1e-12 of their spread of a subspace give explicit equalities, exact ones if they lie in it
     exactly; the rows are found in as many of the coordinates as the subspace has dimensions.

@@ -27,7 +27,7 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """
     n = V.shape[1]
     centre = V.mean(axis=0)
-    scale = _axis_scales(V)
+    scale = axis_scales(V)
     offsets = (V - centre) / scale
     sizes, axes = principal_axes(offsets)
     rank = int(np.count_nonzero(sizes > _FLAT * sizes[0]))
@@ -46,7 +46,7 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 def normals_of_span(directions: Floats) -> Floats:
     """Unit normals (n - rank, n) of the span of directions (k, n), which may lie 1e-12 of their spread beside it."""
     both = np.vstack([directions, -directions])
-    scale = _axis_scales(both)
+    scale = axis_scales(both)
     sizes, axes = principal_axes(both / scale)
     return _unit(axes[np.count_nonzero(sizes > _FLAT * sizes[0]) :] / scale)
 
@@ -56,7 +56,7 @@ def _unit(rows: Floats) -> Floats:
     return scaled
 
 
-def _axis_scales(V: Floats) -> Floats:
+def axis_scales(V: Floats) -> Floats:
     """Powers of two near the widths of the points along the axes; where those are rounding, near the points' size."""
     widths, sizes = np.ptp(V, axis=0), np.abs(V).max(axis=0)
     real = (widths > _FLAT * sizes) & (widths > _NOISE * sizes.max())

@@ -96,7 +96,7 @@ def _draw_faces(ax: Any, P: Rows, style: dict[str, Any]) -> list[Any]:
     faces = [corners[np.abs(corners @ a - b) <= reach * size] for a, b, size in zip(P.A, P.b, lengths, strict=True)]
     faces = [corners] if P.d.size else [face for face in faces if len(face) >= 3]
     solid = Poly3DCollection([_around(face) for face in faces], **style)
-    ax.add_collection3d(solid)
+    ax.add_collection(solid, autolim=False)  # its own limits would count the padding of faces with few corners
     ax.auto_scale_xyz(*corners.T)
     return [solid]
 

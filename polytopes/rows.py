@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes.emptiness import Emptiness, decide_emptiness
-from polytopes.errors import as_array, as_matrix, as_vector
+from polytopes.errors import as_array, as_matrix
 from polytopes.linear_program import Program, prepare
 
 Floats = NDArray[np.float64]
@@ -73,11 +73,6 @@ class Rows:
     def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
         """The same equalities with other inequalities."""
         return type(self)(A, b, self.C, self.d)
-
-
-def as_point(P: Rows, x: ArrayLike) -> Floats:
-    """A point of the space of P; ValueError otherwise."""
-    return as_vector("x", x, P.dim)
 
 
 def same_space(P: Rows, Q: Rows) -> Rows:

@@ -340,6 +340,8 @@ class UncertainModel:
 
         Raises
         ------
+        TypeError
+            If rng is no Generator.
         ValueError
             For a wrong shape, or a schedule that is missing.
         """

@@ -28,6 +28,8 @@ def simulate(
     inputs, x = np.asarray(u, dtype=float), np.asarray(x0, dtype=float)
     if inputs.ndim != 2 or inputs.shape[1] != model.n_inputs or not len(inputs):
         raise ValueError(f"u has shape {inputs.shape}; expected (samples, {model.n_inputs}), at least one sample")
+    if not isinstance(rng, np.random.Generator):
+        raise TypeError(f"rng is {rng!r}; expected a numpy Generator, such as np.random.default_rng(0)")
     if x.shape != (model.n_states,):
         raise ValueError(f"x0 has shape {x.shape}; expected ({model.n_states},)")
     values = None if schedule is None else np.asarray(schedule, dtype=float)

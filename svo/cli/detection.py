@@ -74,7 +74,7 @@ def watch(
     """Show live what a plant's isolation bank says about a log that is still growing.
 
     Which models are alive, bounds of each state by each of them, and each alarm with its certificate. In a terminal a
-    table, elsewhere plain lines. Ctrl-C ends it; standard input ends it too. The exit code is then 0.
+    table, elsewhere plain lines. It ends at Ctrl-C, or when standard input ends. The exit code is then 0.
 
     \b
     Example:

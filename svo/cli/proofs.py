@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 @app.command()
 def verify(
-    alarms: Annotated[Path, typer.Argument(metavar="ALARMS", help="An alarms.jsonl of `svo study` or `svo detect`.")],
+    alarms: Annotated[
+        Path, typer.Argument(metavar="ALARMS", help="An alarms.jsonl of `svo study`, `svo detect` or `svo watch`.")
+    ],
     log: Annotated[
         Path | None, typer.Option(metavar="LOG", help="Also compare the alarms' data with this log.")
     ] = None,

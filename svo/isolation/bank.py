@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from inspect import signature
 from time import perf_counter
@@ -151,14 +151,22 @@ class Bank(ABC):
             answer: Step = observer.late_update(*given)  # type: ignore[attr-defined]
             return answer
 
-        # Who takes it comes first: what is wrong with it shows before any observer has changed.
-        answers = self._ask(late, sorted(self._running, key=lambda name: taken[name] is None))
-        steps = {name: answers[name] for name in self._running}
+        self._check_late(y, taken)
+        steps = self._ask(late)
         falsified, _ = falsified_and_undecided(steps)
         state = replace(self._state, restart=())
         if falsified:  # only those count: the others had their answer at this sample
             state = self._logic.advance(state, self._sample, falsified, undecided=(*self.names, GLOBAL))
         return self._apply(self._sample, state, steps, falsified, self._latest)
+
+    def _check_late(self, y: ArrayLike, taken: Mapping[str, int | None]) -> None:
+        """Every observer that takes a late measurement is asked before any of them changes."""
+        for name, own in taken.items():
+            if own is not None:
+                try:
+                    self._running[name].check_late(y, own)  # type: ignore[attr-defined]
+                except ValueError as error:
+                    raise ValueError(f"observer {name!r}: {error}") from error
 
     def _own_samples(self, sample: int, newest: int) -> dict[str, int | None]:
         """The number that each running observer gives to a sample of the bank; None if its window does not hold it."""
@@ -273,15 +281,15 @@ class Bank(ABC):
 
         return self._ask(timed)
 
-    def _ask(self, call: Callable[[str], Step], names: Iterable[str] | None = None) -> dict[str, Step]:
-        """The answers of the running observers, in their order or in that of the names."""
+    def _ask(self, call: Callable[[str], Step]) -> dict[str, Step]:
+        """The answers of the running observers."""
         if self._refused_by is not None:
             raise ValueError(
                 f"observer {self._refused_by!r} refused a sample that others had already seen; call reset(set), or "
                 "load_state_dict(state) of the sample before"
             )
         steps: dict[str, Step] = {}
-        for name in self._running if names is None else names:
+        for name in self._running:
             try:
                 steps[name] = call(name)
             except Exception as error:

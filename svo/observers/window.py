@@ -182,9 +182,22 @@ class WindowObserver(WindowPrograms):
             observer is unchanged.
         """
         begun = perf_counter()
-        outputs = self._outputs(y)
+        self.check_late(y, sample)
         if self._falsified is not None:
             return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
+        outputs = self._outputs(y)
+        kernel.add_late(self._window, self._size, sample, outputs, self.eps)
+        if self._injection is not None:  # the sample was incomplete, so it is as it was given
+            s = sample % (self._size.N + 1)
+            self._arrays["given.y"][s], self._arrays["given.slack"][s] = self._arrays["y"][s], self._arrays["slack"][s]
+        verdict = self._solve(kernel.ARRIVAL)
+        return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+
+    def check_late(self, y: ArrayLike, sample: int) -> None:
+        """Raise what `late_update` would raise; nothing changes."""
+        outputs = self._outputs(y)
+        if self._falsified is not None:
+            return
         first, last = self.window
         if not (isinstance(sample, int | np.integer) and first <= sample <= last):
             raise ValueError(f"sample is {sample!r}; expected one in the window, which holds {first} to {last}")
@@ -193,12 +206,6 @@ class WindowObserver(WindowPrograms):
         read = ~np.isnan(outputs) & ~np.isnan(self._arrays["y"][sample % (self._size.N + 1)])
         if read.any():
             raise ValueError(f"y has a value of sensor {int(np.argmax(read))}, which was already read at {sample}")
-        kernel.add_late(self._window, self._size, sample, outputs, self.eps)
-        if self._injection is not None:  # the sample was incomplete, so it is as it was given
-            s = sample % (self._size.N + 1)
-            self._arrays["given.y"][s], self._arrays["given.slack"][s] = self._arrays["y"][s], self._arrays["slack"][s]
-        verdict = self._solve(kernel.ARRIVAL)
-        return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
 
     @property
     def window(self) -> tuple[int, int]:

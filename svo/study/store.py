@@ -118,8 +118,17 @@ class StudyFolder:
         return (Exemplar.load(path) for path in sorted(self._exemplars.glob("run-*.npz")))
 
     def identity(self) -> dict[str, Any]:
-        """Configuration and versions, as stored."""
-        return dict(json.loads(self._identity.read_text(encoding="utf-8")))
+        """Configuration and versions, as stored.
+
+        Raises
+        ------
+        ValueError
+            If the folder's ``study.json`` is not that of a study.
+        """
+        stored = json.loads(self._identity.read_text(encoding="utf-8"))
+        if not (isinstance(stored, dict) and isinstance(stored.get("configuration"), dict)):
+            raise ValueError(f"{self._identity} is not that of a study; expected an object with a configuration")
+        return stored
 
     @property
     def _identity(self) -> Path:

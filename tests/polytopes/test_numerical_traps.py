@@ -115,3 +115,28 @@ def random_unbounded(rng: np.random.Generator, n: int) -> HPolytope:
     A = rng.integers(-3, 4, (m, n)).astype(float)
     A = A[A.any(axis=1)]
     return HPolytope(A, rng.integers(1, 5, len(A)))
+
+
+@pytest.mark.parametrize("rank", [2, 3])
+def test_a_set_less_itself_is_a_point(rank: int) -> None:
+    """What is left of the right-hand sides is rounding, so their own size does not tell whether it matters."""
+    rng = np.random.default_rng(rank)
+    for _ in range(10):
+        V = rng.normal(size=(6, rank)) @ rng.normal(size=(rank, 3)) + rng.normal(size=3)
+        P = HPolytope.from_vertices(V)
+        left = P.pontryagin_difference(P)
+        assert left.emptiness().status == "nonempty"
+        assert left.affine_dim() == 0
+        assert left.contains(np.zeros(3), tol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_rays_on_axes_of_different_scales_stay_in_the_set(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scales = 10.0 ** np.array([-6.0, 0.0, 2.0])
+    V, rays = rng.normal(size=(4, 3)) * scales, rng.normal(size=(3, 3)) * scales
+    P = HPolytope.from_vertices(V, rays)
+    lengths = np.abs(P.A) @ np.abs(rays).max(axis=0)
+    assert len(P.b) > 0
+    assert (P.A @ rays.T <= 1e-9 * lengths[:, None]).all()
+    assert (P.A @ V.T <= P.b[:, None] + 1e-9 * (np.abs(P.A) @ np.abs(V).max(axis=0))[:, None]).all()

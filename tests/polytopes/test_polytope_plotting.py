@@ -46,6 +46,25 @@ def test_every_kind_of_set_can_be_drawn_in_space(name: str, height: float) -> No
     plt.close("all")
 
 
+def test_what_pads_faces_with_few_corners_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Matplotlib fills its table of faces with whatever is in memory, and its own limits overflow on some of that."""
+    prism = HPolytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).product(HPolytope.box([0.0], [1.0]))
+    empty = np.empty
+
+    def dirty(shape: object, dtype: object = float, **options: object) -> np.ndarray:
+        table = empty(shape, dtype, **options)  # type: ignore[call-overload]
+        if table.dtype.kind == "f":
+            table.fill(-np.finfo(float).max)
+        return table
+
+    monkeypatch.setattr(np, "empty", dirty)
+    prism.plot(dims=(0, 1, 2))
+    low, high = plt.gca().get_xlim()
+    plt.close("all")
+    assert -0.2 < low <= 0.0
+    assert 1.0 <= high < 1.2
+
+
 def test_faces_of_a_cube() -> None:
     (solid,) = CATALOGUE["cube"].plot(dims=(2, 0, 1))
     faces = list(solid._faces)

@@ -296,3 +296,5 @@ def test_a_report_is_written_from_the_runs_so_far(registered_tank: str, tmp_path
         part.unlink()
     assert "holds no finished run yet" in one_line(svo("report", out))
     assert "study.json" in one_line(svo("report", tmp_path / "nowhere"))
+    (out / "study.json").write_text("{}", encoding="utf-8")
+    assert "study.json is not that of a study" in one_line(svo("report", out))

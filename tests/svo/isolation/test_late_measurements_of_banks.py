@@ -177,3 +177,20 @@ def test_what_does_not_fit_is_named_and_changes_nothing() -> None:
     mixed.update(log.y[0], u=log.u[0])
     with pytest.raises(TypeError, match="observer 'loss' \\(ConstrainedZonotopeObserver\\) takes no measurements that"):
         mixed.late_update([np.nan, np.nan], 0)
+
+
+def test_a_measurement_that_comes_twice_is_refused_before_any_observer_changes() -> None:
+    """An observer that started again at this very sample has not read it, the others have."""
+    rng = np.random.default_rng(2)
+    nominal = plant(rng)
+    log = fly(nominal, None, np.zeros(2), rng, samples=12)
+    first = HPolytope.box(np.full(2, -0.5), np.full(2, 0.5))
+    wide = WindowObserver(nominal.replace(w=np.full(2, 20.0), n=np.full(2, 3.0)), first, 4)
+    bank = ArchitectureI(WindowObserver(nominal, first, 4), {"wide": wide}, debounce=2, recovery=5)
+    log.y[8, 1] += 1.5
+    for k in range(9):
+        verdict = take(bank, log, k, late=False)
+    assert verdict.steps["nominal"].verdict == "falsified"
+    with pytest.raises(ValueError, match="observer 'wide': y has a value of sensor 1, which was already read at 8"):
+        bank.late_update([np.nan, log.y[8, 1]], 8)
+    assert take(bank, log, 9, late=False).steps["wide"].verdict == "consistent"
