@@ -138,5 +138,5 @@ def test_rays_on_axes_of_different_scales_stay_in_the_set(seed: int) -> None:
     P = HPolytope.from_vertices(V, rays)
     lengths = np.abs(P.A) @ np.abs(rays).max(axis=0)
     assert len(P.b) > 0
-    assert (P.A @ rays.T <= 1e-9 * lengths[:, None]).all()
-    assert (P.A @ V.T <= P.b[:, None] + 1e-9 * (np.abs(P.A) @ np.abs(V).max(axis=0))[:, None]).all()
+    assert (1e-9 * lengths[:, None] >= P.A @ rays.T).all()
+    assert (P.b[:, None] + 1e-9 * (np.abs(P.A) @ np.abs(V).max(axis=0))[:, None] >= P.A @ V.T).all()
