@@ -10,10 +10,10 @@ Engineering Practice 21 (2013), equations (1) and (8), are the case without a, c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,56 +23,14 @@ from svo.checks import check_disturbance_box, check_noise, finite_array
 from svo.discretisation import discretise
 from svo.log import Log
 from svo.model_file import read_arrays
-from svo.schedule_table import ScheduleTable
 from svo.simulation import simulate
+from svo.stack import OUTPUT_BLOCKS, STATE_BLOCKS, Layout, ScheduledBlock, Stack
 from svo.state_space import state_space
 from svo.uncertainty import Schedulable, Uncertainty
 
-__all__ = ["Layout", "UncertainModel", "Uncertainty"]
+__all__ = ["UncertainModel", "Uncertainty"]
 
 Array = NDArray[np.float64]
-
-_STATE_BLOCKS = ("A", "B", "a", "E")
-_OUTPUT_BLOCKS = ("C", "D", "c", "F")
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where the blocks stand in a stacked sample [[A B a E], [C D c F]]."""
-
-    n: int
-    nu: int
-    nw: int
-    ny: int
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.n + self.ny, self.n + self.nu + 1 + self.nw
-
-    def block(self, name: str) -> tuple[slice, slice]:
-        columns = {
-            "A": slice(0, self.n),
-            "B": slice(self.n, self.n + self.nu),
-            "a": slice(self.n + self.nu, self.n + self.nu + 1),
-            "E": slice(self.n + self.nu + 1, self.shape[1]),
-        }
-        state = name in _STATE_BLOCKS
-        rows = slice(0, self.n) if state else slice(self.n, self.n + self.ny)
-        return rows, columns[name if state else _STATE_BLOCKS[_OUTPUT_BLOCKS.index(name)]]
-
-    def block_shape(self, name: str) -> tuple[int, ...]:
-        rows, cols = self.block(name)
-        return (rows.stop - rows.start,) if name in "ac" else (rows.stop - rows.start, cols.stop - cols.start)
-
-
-class _Scheduled(NamedTuple):
-    """An array that is a function of the schedule, and where it stands in the stack."""
-
-    item: int
-    name: str
-    where: tuple[Any, ...]
-    shape: tuple[int, ...]
-    function: Callable[[Any], ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +78,7 @@ class UncertainModel:
     uncertainties: Sequence[Uncertainty] = ()
     schedule: Any = None
     layout: Layout = field(init=False, repr=False)
-    _constant: Array = field(init=False, repr=False)
-    _scheduled: tuple[_Scheduled, ...] = field(init=False, repr=False)
-    _table: ScheduleTable | None = field(init=False, repr=False)
+    _stack: Stack = field(init=False, repr=False)
     _bounds: tuple[Any, Any, Any] = field(init=False, repr=False)
     _bounds_scheduled: bool = field(init=False, repr=False)
 
@@ -131,10 +87,7 @@ class UncertainModel:
         if not (np.isfinite(self.Ts) and self.Ts > 0):
             raise ValueError(f"Ts is {self.Ts}; expected a positive sampling time in seconds")
         object.__setattr__(self, "layout", self._measure())
-        constant, scheduled = self._split()
-        object.__setattr__(self, "_constant", constant)
-        object.__setattr__(self, "_scheduled", scheduled)
-        object.__setattr__(self, "_table", self._tabulate())
+        object.__setattr__(self, "_stack", self._stacked())
         object.__setattr__(self, "_bounds", (*self._disturbance_bounds(), self._noise_bound()))
         object.__setattr__(self, "_bounds_scheduled", any(callable(b) for b in self._bounds))
         if self._bounds_scheduled and self.schedule is None:
@@ -166,7 +119,7 @@ class UncertainModel:
     @property
     def is_scheduled(self) -> bool:
         """Whether any array or bound is a function of the schedule."""
-        return bool(self._scheduled) or self._bounds_scheduled
+        return bool(self._stack.scheduled) or self._bounds_scheduled
 
     @property
     def uses_input_in_output(self) -> bool:
@@ -188,19 +141,7 @@ class UncertainModel:
         (1 + n_uncertainties, n + ny, n + nu + 1 + nw) array
             Item 0 is [[A B a E], [C D c F]]; item i is the same stack of uncertainty i.
         """
-        if not self._scheduled:
-            return self._constant
-        if self._table is not None:
-            return self._table(schedule)
-        stack = self._constant.copy()
-        for entry in self._scheduled:
-            value = np.asarray(entry.function(schedule), dtype=float)
-            if value.shape != entry.shape:
-                raise ValueError(
-                    self._shape_message(entry.item, entry.name, value.shape) + f", at schedule {schedule!r}"
-                )
-            stack[entry.where] = value
-        return stack
+        return self._stack.at(schedule)
 
     def stack_over(self, schedule: ArrayLike) -> Array:
         """`stack` at many samples.
@@ -217,20 +158,7 @@ class UncertainModel:
         -------
         (K, 1 + n_uncertainties, n + ny, n + nu + 1 + nw) array
         """
-        values = np.asarray(schedule, dtype=float)
-        if self._table is not None:
-            return self._table.over(values)
-        stacks = np.repeat(self._constant[None], len(values), axis=0)
-        if not all(hasattr(entry.function, "over") for entry in self._scheduled):
-            for k, value in enumerate(values):
-                stacks[k] = self.stack(float(value) if value.ndim == 0 else value)
-            return stacks
-        for entry in self._scheduled:
-            array: Array = np.asarray(entry.function.over(values), dtype=np.float64)  # type: ignore[attr-defined]
-            if array.shape != (len(values), *entry.shape):
-                raise ValueError(self._shape_message(entry.item, entry.name, array.shape[1:]) + " at each sample")
-            stacks[(slice(None), *entry.where)] = array
-        return stacks
+        return self._stack.over(schedule)
 
     def bounds(self, schedule: Any = None) -> tuple[Array, Array, Array]:
         """Disturbance bounds (nw,), (nw,) and noise half-width (ny,) at one sample."""
@@ -374,43 +302,24 @@ class UncertainModel:
         nw = E.shape[1] if E is not None else (F.shape[1] if F is not None and F.ndim == 2 else 0)
         return Layout(n=A.shape[0], nu=0 if B is None else B.shape[1], nw=nw, ny=C.shape[0])
 
-    def _split(self) -> tuple[Array, tuple[_Scheduled, ...]]:
+    def _stacked(self) -> Stack:
         constant = np.zeros((1 + len(self.uncertainties), *self.layout.shape))
         scheduled = []
-        for item, owner in enumerate((self, *self.uncertainties)):
-            for name in _STATE_BLOCKS + _OUTPUT_BLOCKS:
-                value = getattr(owner, name)
-                if value is None:
+        for item, source in enumerate((self, *self.uncertainties)):
+            owner = "" if item == 0 else f" of uncertainty {self.uncertainties[item - 1].name or item - 1}"
+            for name in STATE_BLOCKS + OUTPUT_BLOCKS:
+                value, array = getattr(source, name), self._value(name, source)
+                if array is None:
                     continue
-                array = self._value(name, owner)
-                assert array is not None
                 if array.shape != self.layout.block_shape(name):
-                    raise ValueError(self._shape_message(item, name, array.shape))
+                    raise ValueError(self.layout.shape_message(owner, name, array.shape))
                 rows, cols = self.layout.block(name)
                 where = (item, rows, cols.start if array.ndim == 1 else cols)
                 if callable(value):
-                    scheduled.append(_Scheduled(item, name, where, array.shape, value))
+                    scheduled.append(ScheduledBlock(name, owner, where, array.shape, value))
                 else:
                     constant[where] = array
-        constant.setflags(write=False)
-        return constant, tuple(scheduled)
-
-    def _tabulate(self) -> ScheduleTable | None:
-        """The whole stack as one table, where every scheduled array is a table over the same points."""
-        first = self._scheduled[0].function if self._scheduled else None
-        if not isinstance(first, ScheduleTable):
-            return None
-        stacks = np.repeat(self._constant[None], len(first.points), axis=0)
-        for entry in self._scheduled:
-            table = entry.function
-            if not (isinstance(table, ScheduleTable) and table.has_points_of(first)):
-                return None
-            stacks[(slice(None), *entry.where)] = table.values
-        return ScheduleTable(first.points, stacks)
-
-    def _shape_message(self, item: int, name: str, shape: tuple[int, ...]) -> str:
-        owner = "" if item == 0 else f" of uncertainty {self.uncertainties[item - 1].name or item - 1}"
-        return f"{name}{owner} has shape {shape}; expected {self.layout.block_shape(name)}"
+        return Stack(self.layout, constant, tuple(scheduled))
 
     def _disturbance_bounds(self) -> tuple[Any, Any]:
         nw, w = self.layout.nw, self.w
