@@ -239,7 +239,7 @@ def in_architecture(plant: Any, architecture: str | None) -> Any:
         return plant
     name = plant.name
     if not isinstance(plant, OffersArchitectures):
-        raise ValueError(f"plant {name!r} has one bank only (no with_architecture); leave the architecture out")
+        raise ValueError(f"plant {name!r} has one architecture only; leave the choice out")
     if architecture not in plant.architectures:
         raise ValueError(
             f"plant {name!r} has no architecture {architecture!r}; it has {', '.join(plant.architectures)}"

@@ -18,7 +18,12 @@ def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[s
     for name in faults:
         if not isinstance(name, str) or not name.strip() or name in reserved:
             raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")
-    return {NOMINAL: nominal, **faults}
+    observers = {NOMINAL: nominal, **faults}
+    for name, observer in observers.items():
+        if not callable(getattr(observer, "step", None)):
+            kind = type(observer).__name__
+            raise TypeError(f"{name!r} is a {kind}; expected an observer, such as WindowObserver(model, initial)")
+    return observers
 
 
 def check_counts(debounce: int, recovery: int | None, timeout: int | None) -> None:

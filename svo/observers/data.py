@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -55,16 +56,16 @@ def directions_of(directions: ArrayLike, n: int) -> Array:
     return rows
 
 
-def steps_of(observer: Any, log: Log, needs_next_input: bool) -> list[Any]:
-    """The answers of an observer that has not started, at every sample of a log."""
+def steps_of(observer: Any, log: Log, needs_next_input: bool) -> Iterator[Any]:
+    """The answers of an observer that has not started, at one sample of a log after the other."""
+    if not isinstance(log, Log):
+        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log")
     if len(log) == 0:
         raise ValueError("log has no samples; expected at least one")
-    steps = []
     for k in range(len(log)):
         following = log.u[k] if needs_next_input else None
         schedule = log.schedule_at(k)
         if k == 0:
-            steps.append(observer.update(log.y[k], following, schedule))
+            yield observer.update(log.y[k], following, schedule)
         else:
-            steps.append(observer.step(log.u[k - 1], log.y[k], following, schedule))
-    return steps
+            yield observer.step(log.u[k - 1], log.y[k], following, schedule)

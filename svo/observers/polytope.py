@@ -207,7 +207,7 @@ class PolytopeObserver:
 
     def run(self, log: Log) -> PolytopeRecord:
         """All samples of a log, with the box of the state at each."""
-        steps = steps_of(self, log, self.model.uses_input_in_output)
+        steps = list(steps_of(self, log, self.model.uses_input_in_output))
         boxes = np.array([step.box for step in steps])
         return PolytopeRecord(
             verdicts=tuple(step.verdict for step in steps),

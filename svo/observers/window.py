@@ -14,6 +14,7 @@ from polytopes import HPolytope
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
+from svo.observers.data import steps_of
 from svo.observers.proof import ArrivalSet
 from svo.observers.window_programs import ENTRY_ERRORS, WindowPrograms
 from svo.observers.window_setup import (
@@ -257,23 +258,15 @@ class WindowObserver(WindowPrograms):
 
     def run(self, log: Log) -> WindowRecord:
         """All samples of a log, with the box of the state at each."""
-        steps, lower, upper = [], [], []
-        for k in range(len(log)):
-            following = log.u[k] if self._wants_next_input else None
-            schedule = log.schedule_at(k)
-            step = (
-                self.update(log.y[k], following, schedule)
-                if k == 0
-                else self.step(log.u[k - 1], log.y[k], following, schedule)
-            )
-            box = step.box
+        steps, boxes = [], []
+        for step in steps_of(self, log, self._wants_next_input):
             steps.append(step)
-            lower.append(box[0])
-            upper.append(box[1])
+            boxes.append(step.box)  # it is that of the newest sample only
+        bounds = np.array(boxes)
         return WindowRecord(
             verdicts=tuple(s.verdict for s in steps),
-            lower=np.array(lower),
-            upper=np.array(upper),
+            lower=bounds[:, 0],
+            upper=bounds[:, 1],
             seconds=np.array([s.seconds for s in steps]),
             certificate=self._falsified,
         )

@@ -153,7 +153,7 @@ class ConstrainedZonotopeObserver:
 
     def run(self, log: Log) -> ZonotopeRecord:
         """All samples of a log, with the box of the state at each."""
-        steps = steps_of(self, log, self._wants_next_input)
+        steps = list(steps_of(self, log, self._wants_next_input))
         boxes = np.array([step.box for step in steps])
         return ZonotopeRecord(
             verdicts=tuple(step.verdict for step in steps),

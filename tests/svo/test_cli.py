@@ -222,7 +222,7 @@ def test_the_whole_chain_is_proven(log: Path, tmp_path: Path) -> None:
 def test_a_plant_with_one_bank_has_no_architectures(log: Path, tmp_path: Path) -> None:
     for command in (["detect", "tank", log], ["study", "tank", "--out", tmp_path / "study"]):
         message = one_line(svo(*command, "--architecture", "II"))
-        assert "plant 'tank' has one bank only (no with_architecture)" in message
+        assert "plant 'tank' has one architecture only" in message
     unknown = svo("study", "eclipse", "--architecture", "III", "--out", tmp_path / "study")
     assert "plant 'eclipse' has no architecture 'III'; it has I, II" in one_line(unknown)
 

@@ -213,6 +213,8 @@ def test_names_and_observers_are_checked() -> None:
     for name in ("nominal", "", "  ", 3):
         with pytest.raises(ValueError, match="faults has the name"):
             ArchitectureI(one, {name: two})  # type: ignore[dict-item]
+    with pytest.raises(TypeError, match="'a' is a str; expected an observer"):
+        ArchitectureI(one, {"a": "b"})  # type: ignore[dict-item]
     with pytest.raises(ValueError, match="'a' and 'nominal' are the same observer"):
         ArchitectureI(one, {"a": one})
 

@@ -138,3 +138,12 @@ def test_wrong_data_are_refused_and_leave_the_observer_as_it_was(kind: Any) -> N
     twin = kind(model, BOX)
     advance(twin, log, 0)
     np.testing.assert_array_equal(advance(observer, log, 1).box, advance(twin, log, 1).box)
+
+
+@every_observer
+def test_what_is_no_log_is_named(kind: Any) -> None:
+    observer = kind(cart(), BOX)
+    with pytest.raises(TypeError, match="log is ndarray; expected"):
+        observer.run(np.zeros((3, 1)))
+    with pytest.raises(ValueError, match="log has no samples"):
+        observer.run(Log(np.zeros(0), np.zeros((0, 1)), np.zeros((0, 1))))
