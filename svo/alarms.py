@@ -77,7 +77,7 @@ def read_alarms(path: str | Path) -> list[Alarm]:
     Raises
     ------
     ValueError
-        Naming the first line that is no intact alarm record.
+        Naming the first line that is no intact alarm record, or if the file is none of alarms.
     """
     alarms = []
     for number, text in _lines(path):
@@ -89,14 +89,34 @@ def read_alarms(path: str | Path) -> list[Alarm]:
 
 
 def verify_alarms(path: str | Path, log: Log | None = None) -> list[AlarmCheck]:
-    """Check every stored alarm: digest, proof in exact arithmetic and, given the log, the data."""
+    """Check every stored alarm: digest, proof in exact arithmetic and, given the log, the data.
+
+    Raises
+    ------
+    ValueError
+        If no line is a JSON object, so that the file is none of alarms. An empty file has no checks.
+    """
     return [_check(number, text, log) for number, text in _lines(path)]
 
 
 def _lines(path: str | Path) -> list[tuple[int, str]]:
+    """Numbers and text of the lines that are not blank."""
     # Bytes that are no text make a bad line, like any other damage.
     with open(path, encoding="utf-8", errors="replace") as file:
-        return [(number, text) for number, text in enumerate(file, start=1) if text.strip()]
+        lines = [(number, text) for number, text in enumerate(file, start=1) if text.strip()]
+    if lines and not any(_is_object(text) for _, text in lines):
+        raise ValueError(
+            f"{path} is no file of alarms (line {lines[0][0]} is no JSON object, nor is any other); "
+            "expected an alarms.jsonl that svo detect, svo watch or svo study wrote"
+        )
+    return lines
+
+
+def _is_object(text: str) -> bool:
+    try:
+        return isinstance(json.loads(text), dict)
+    except (ValueError, RecursionError):
+        return False
 
 
 class _BadRecord(ValueError):

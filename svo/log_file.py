@@ -71,7 +71,14 @@ def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
         If the format needs a package that is not installed.
     """
     path = Path(path)
+    if path.is_dir():
+        raise ValueError(f"{path} is a folder; expected a log file, one of {', '.join(_FORMATS)}")
     return _format(path).read(path, columns, Ts)
+
+
+def check_suffix(path: str | Path) -> None:
+    """Raise a ValueError if the suffix is not that of a log file."""
+    _format(Path(path))
 
 
 def _format(path: Path) -> _Format:

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors
-from svo.cli.options import AsJson, FaultSize, FlightSeed, NoiseName, PlantName
+from svo.cli.destinations import writable_csv, writable_folder
+from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors, plant_to_simulate
+from svo.cli.options import AsJson, FaultSize, FlightSeed, NoiseName, PlantName, finite
 from svo.cli.output import print_isolability, print_json
 
 
@@ -35,10 +36,9 @@ def distinguish(
     """
     with one_line_errors():
         from svo.isolability import isolability
-        from svo.plant import load_plant
         from svo.progress import progress
 
-        the_plant = load_plant(plant)
+        the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
         announce(PREPARING)
         with progress("Pairs") as update:
@@ -64,7 +64,9 @@ def design_input(
     noise: NoiseName = None,
     seed: FlightSeed = 0,
     size: FaultSize = 1.0,
-    out: Annotated[Path | None, typer.Option(metavar="INPUT.csv", help="CSV file of the designed inputs.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="INPUT.csv", callback=writable_csv, help="CSV file of the designed inputs.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Design the input of (locally) least energy that isolates a fault for certain within a number of samples.
@@ -77,10 +79,9 @@ def design_input(
       svo design-input eclipse --fault elevator --size 0.3 --horizon 10 --hold 5 --noise conservative
     """
     with one_line_errors():
-        from svo.plant import load_plant
         from svo.plant_input import plant_input
 
-        the_plant = load_plant(plant)
+        the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
         announce(PREPARING)
         found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
@@ -97,14 +98,20 @@ def design_input(
 @app.command()
 def compare(
     plant: PlantName,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for comparison.csv, runs.csv and comparison.png.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="DIR", callback=writable_folder, help="Folder for comparison.csv, runs.csv and comparison.png."
+        ),
+    ],
     runs: Annotated[int, typer.Option(min=1, help="Judged runs of each fault, profile and noise.")] = 50,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison; the same seed gives the same runs.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
     or 1,
     noise: NoiseName = None,
     rate: Annotated[
-        float, typer.Option(min=0.0, max=0.5, help="Share of fault-free runs that may raise an alarm.")
+        float,
+        typer.Option(min=0.0, max=0.5, callback=finite, help="Share of fault-free runs that may raise an alarm."),
     ] = 0.02,
     healthy_runs: Annotated[
         int | None,
@@ -131,10 +138,9 @@ def compare(
 
         from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
         from svo.comparison.publish import publish_comparison, to_text
-        from svo.plant import load_plant
         from svo.progress import progress
 
-        the_plant = load_plant(plant)
+        the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
         for name in distribution or ():
             if name not in DISTRIBUTIONS:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from svo.cli.destinations import writable_folder
 from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName
 from svo.cli.output import print_detection, print_json
@@ -16,7 +17,10 @@ from svo.cli.output import print_detection, print_json
 def detect(
     plant: DescribedName,
     log: LogFile,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl and verdict.json.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", callback=writable_folder, help="Folder for alarms.jsonl and verdict.json."),
+    ] = None,
     noise: NoiseName = None,
     architecture: Architecture = None,
     as_json: AsJson = False,
@@ -64,7 +68,10 @@ def watch(
     plant: DescribedName,
     log: Annotated[str, typer.Argument(metavar="LOG", help="CSV file that is being written, or - for standard input.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for alarms.jsonl, written as they are raised.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", callback=writable_folder, help="Folder for alarms.jsonl, written as they are raised."
+        ),
     ] = None,
     noise: NoiseName = None,
     until_end: Annotated[

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from svo.plant import MonitoredPlant
+    from svo.plant import MonitoredPlant, Plant
 
 app = typer.Typer(
     help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
@@ -38,6 +38,21 @@ def one_line_errors() -> Iterator[None]:
 def fail(message: str, code: int = 1) -> None:
     typer.echo(f"error: {' '.join(message.split())}", err=True)
     raise typer.Exit(code)
+
+
+def plant_to_simulate(name: str) -> Plant:
+    """The registered plant of that name, for the commands that a description alone is not enough for."""
+    from svo.description.find import SUFFIX
+    from svo.plant import load_plant, registered_plants
+
+    if name.endswith(SUFFIX):
+        raise ValueError(
+            f"{name}: a TOML file describes a model for logs, and this command needs a plant that it can simulate; "
+            f"expected a registered one: {', '.join(registered_plants()) or 'none is installed'}. Use the file with "
+            "svo detect, svo watch or svo calibrate, or register a plant in Python (docs/studies.md, 'A plant of your "
+            "own')"
+        )
+    return load_plant(name)
 
 
 def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:

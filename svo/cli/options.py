@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+
+def finite(value: float) -> float:
+    """A number that is neither NaN nor infinite."""
+    if not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is not a finite number.")
+    return value
+
 
 DescribedName = Annotated[
     str, typer.Argument(metavar="PLANT", help="A registered plant, or a TOML file that describes one (my.toml).")
@@ -23,4 +32,7 @@ Architecture = Annotated[
     typer.Option(metavar="NAME", help="Architecture of the bank, such as I or II. [default: the plant's own]"),
 ]
 FlightSeed = Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")]
-FaultSize = Annotated[float, typer.Option(metavar="FRACTION", help="Size of the faults, of those the plant states.")]
+FaultSize = Annotated[
+    float,
+    typer.Option(metavar="FRACTION", callback=finite, help="Size of the faults, of those the plant states."),
+]

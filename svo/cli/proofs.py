@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,9 +12,10 @@ from svo.cli.options import AsJson
 from svo.cli.output import print_checks, print_json
 
 if TYPE_CHECKING:
-    from svo.alarms import Alarm, AlarmCheck
-    from svo.log import Log
-    from svo.plant import MonitoredPlant
+    from svo.alarms import AlarmCheck
+
+
+_WHY_EMPTY = "no model was falsified in what wrote it, or the file was cut off"
 
 
 @app.command()
@@ -36,7 +36,7 @@ def verify(
 
     A window's proof is conditional on the set of states at its start. With --full the plant's observers are run
     over the log again, and every bound from the first sample to the alarm is proven in exact arithmetic (some
-    seconds an alarm). The exit code is 1 if any alarm fails.
+    seconds an alarm). The exit code is 1 if any alarm fails, and if there is none.
 
     \b
     Example:
@@ -44,6 +44,9 @@ def verify(
     """
     with one_line_errors():
         checks = _checks(alarms, log, full)
+        if not checks:
+            # Success would say that something was proven.
+            raise ValueError(f"{alarms} holds no alarm, so there is nothing to prove: {_WHY_EMPTY}")
         if as_json:
             print_json(
                 [
@@ -60,33 +63,26 @@ def verify(
 def _checks(path: Path, log: Path | None, full: Path | None) -> list[AlarmCheck]:
     from svo.alarms import read_alarms, verify_alarms
 
-    alarms = [] if log is None and full is None else read_alarms(path)
-    if full is None:
-        return verify_alarms(path, None if log is None else _log_of(path, alarms, log))
-    if log is not None:
+    if log is not None and full is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")
-    from svo.verification import verify_chains
-
-    data = _log_of(path, alarms, full)
-    return [] if data is None else verify_chains(path, data, _plant_of(path, alarms))
-
-
-def _plant_of(path: Path, alarms: Sequence[Alarm]) -> MonitoredPlant:
-    """The plant whose model alarms are about; a description lies beside them, where `svo detect` put it."""
-    from svo.description import find_plant
-
-    return find_plant(str(alarms[0].source.get("plant")), path.parent)
-
-
-def _log_of(path: Path, alarms: Sequence[Alarm], log: Path) -> Log | None:
-    """The log to compare alarms with, read by the columns of their plant; None if there are no alarms."""
-    from svo.log_file import read_log
-
+    wanted = log or full
+    if wanted is None:
+        return verify_alarms(path)
+    alarms = read_alarms(path)
     if not alarms:
-        return None
+        return []
     if any(alarm.source != alarms[0].source for alarm in alarms):
         raise ValueError(
             f"{path} has alarms of several runs, and a log is that of one; give the alarms of that run alone"
         )
-    plant = _plant_of(path, alarms)
-    return read_log(log, plant.columns, plant.Ts)
+    from svo.description import find_plant
+    from svo.log_file import read_log
+
+    # A description lies beside the alarms, where `svo detect` put it.
+    plant = find_plant(str(alarms[0].source.get("plant")), path.parent)
+    data = read_log(wanted, plant.columns, plant.Ts)
+    if full is None:
+        return verify_alarms(path, data)
+    from svo.verification import verify_chains
+
+    return verify_chains(path, data, plant)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors
+from svo.cli.destinations import writable_folder, writable_log
+from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors, plant_to_simulate
 from svo.cli.options import AsJson, NoiseName, PlantName
 from svo.cli.output import describe, print_detector_study, print_json, print_study
 
@@ -42,7 +43,12 @@ def plants(as_json: AsJson = False) -> None:
 @app.command()
 def study(
     plant: PlantName,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results; new or empty, unless --resume.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="DIR", callback=writable_folder, help="Folder of the results; new or empty, unless --resume."
+        ),
+    ],
     runs: Annotated[
         int, typer.Option(min=1, help="Runs of each noise set, fault and profile, and without a fault.")
     ] = 10,
@@ -87,14 +93,13 @@ def study(
     with one_line_errors():
         _need_study_extra()
         from svo.interval.study import LearnsDetectors
-        from svo.plant import load_plant
         from svo.progress import progress
         from svo.study.configuration import StudyConfiguration
         from svo.study.publish import publish
         from svo.study.runner import run_study, warm_up
         from svo.study.store import StudyFolder
 
-        the_plant = load_plant(plant)
+        the_plant = plant_to_simulate(plant)
         configuration = StudyConfiguration.for_plant(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
         )
@@ -119,7 +124,10 @@ def study(
 
 @app.command()
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study, finished or still running.")],
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", callback=writable_folder, help="Folder of a study, finished or still running."),
+    ],
 ) -> None:
     """Write summary.csv, pictures and report.html of a study from the runs that it has so far.
 
@@ -149,7 +157,9 @@ def report(
 @app.command()
 def simulate(
     plant: PlantName,
-    out: Annotated[Path, typer.Option(metavar="LOG.csv", help="CSV file to write.")],
+    out: Annotated[
+        Path, typer.Option(metavar="LOG.csv", callback=writable_log, help="CSV, Parquet or MAT file to write.")
+    ],
     fault: Annotated[str, typer.Option(metavar="NAME", help="Fault to simulate, or none.")] = "none",
     profile: Annotated[
         str | None, typer.Option(metavar="NAME", help="Shape of the fault in time. [default: the fault's first]")
@@ -165,10 +175,10 @@ def simulate(
     """
     with one_line_errors():
         from svo.log_file import write_log
-        from svo.plant import HEALTHY, fault_start, load_plant
+        from svo.plant import HEALTHY, fault_start
         from svo.study.configuration import check_fault
 
-        the_plant = load_plant(plant)
+        the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
         if fault == HEALTHY:
             if profile not in (None, HEALTHY):

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 from svo.description.plant import DescribedPlant, read_description
-from svo.plant import MonitoredPlant, load_plant
+from svo.plant import MonitoredPlant, load_plant, registered_plants
 
 SUFFIX = ".toml"
 
@@ -21,7 +21,11 @@ def find_plant(name: str, folder: Path = Path()) -> MonitoredPlant:
     OSError
         If the file cannot be opened.
     """
-    return read_description(folder / name) if name.endswith(SUFFIX) else load_plant(name)
+    if name.endswith(SUFFIX):
+        return read_description(folder / name)
+    if name not in registered_plants() and (folder / name).is_file():
+        raise ValueError(f"{name} is a file, and no plant is registered by that name; a description ends in {SUFFIX}")
+    return load_plant(name)
 
 
 def keep_description(plant: MonitoredPlant, folder: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -106,15 +107,34 @@ def test_an_alarm_with_a_changed_number_is_rejected(log: Path, tmp_path: Path) -
     assert "1 of 2 alarms proven" in result.stdout
 
 
-def test_what_is_no_alarm_is_a_failed_one(registered_tank: str, tmp_path: Path) -> None:
-    for content in (b"hello\n", b"{}\n", b"[1]\n", bytes(range(128, 256))):
-        (tmp_path / "alarms.jsonl").write_bytes(content)
-        result = svo("verify", tmp_path / "alarms.jsonl")
-        assert result.exit_code == 1
-        assert "0 of 1 alarms proven" in result.stdout
-        assert "alarms.jsonl, line 1: " in result.stderr
-    (tmp_path / "alarms.jsonl").write_text("")
-    assert svo("verify", tmp_path / "alarms.jsonl").exit_code == 0
+def test_what_is_no_alarm_is_a_failed_one(tmp_path: Path) -> None:
+    (tmp_path / "alarms.jsonl").write_bytes(b"{}\n")
+    result = svo("verify", tmp_path / "alarms.jsonl")
+    assert result.exit_code == 1
+    assert "0 of 1 alarms proven" in result.stdout
+    assert "alarms.jsonl, line 1: " in result.stderr
+
+
+@pytest.mark.parametrize("more", [(), ("--json",), ("--log", "log.csv"), ("--full", "log.csv")])
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "alarms.jsonl holds no alarm, so there is nothing to prove"),
+        (b"\n\n", "alarms.jsonl holds no alarm, so there is nothing to prove"),
+        (b"hello\n", "alarms.jsonl is no file of alarms (line 1 is no JSON object"),
+        (b"time_s,u,y\n0,1,2\n0.1,1,2\n", "alarms.jsonl is no file of alarms (line 1 is no JSON object"),
+        (b"\n1\n2\n", "alarms.jsonl is no file of alarms (line 2 is no JSON object"),
+        (bytes(range(128, 256)), "expected an alarms.jsonl that svo detect, svo watch or svo study wrote"),
+    ],
+)
+def test_a_file_without_alarms_is_one_error(
+    log: Path, tmp_path: Path, content: bytes, expected: str, more: tuple[str, ...]
+) -> None:
+    (tmp_path / "alarms.jsonl").write_bytes(content)
+    options = [str(tmp_path / option) if option.endswith(".csv") else option for option in more]
+    result = svo("verify", tmp_path / "alarms.jsonl", *options)
+    assert expected in one_line(result)
+    assert result.stdout == ""
 
 
 def test_a_healthy_log_has_no_fault(registered_tank: str, tmp_path: Path) -> None:
@@ -155,14 +175,90 @@ def test_what_does_not_exist_is_one_line(log: Path, tmp_path: Path) -> None:
     assert "missing.csv: No such file" in one_line(svo("detect", "tank", tmp_path / "missing.csv"))
     assert "missing.jsonl: No such file" in one_line(svo("verify", tmp_path / "missing.jsonl"))
     (tmp_path / "folder.csv").mkdir()
-    assert "Is a directory" in one_line(svo("detect", "tank", tmp_path / "folder.csv"))
+    assert "folder.csv is a folder; expected a log file" in one_line(svo("detect", "tank", tmp_path / "folder.csv"))
+    assert "is a folder; expected a log file" in one_line(svo("detect", "tank", tmp_path))
+    assert "is a file, and no plant is registered by that name" in one_line(svo("detect", log, log))
     assert "has the suffix '.xls'; expected one of .csv, .parquet, .mat" in one_line(svo("detect", "tank", "log.xls"))
     simulate = ("simulate", "tank", "--out", tmp_path / "x.csv")
     assert "has no fault 'rust'" in one_line(svo(*simulate, "--fault", "rust"))
     assert "has no profile 'soft'; it has step" in one_line(svo(*simulate, "--fault", "gauge", "--profile", "soft"))
     assert "given without a fault" in one_line(svo(*simulate, "--profile", "step"))
-    assert "No such file" in one_line(svo("simulate", "tank", "--out", tmp_path / "no" / "x.csv"))
     assert not (tmp_path / "x.csv").exists()
+
+
+TO_A_FOLDER = [
+    ("detect", "tank", "log.csv"), ("watch", "tank", "log.csv", "--until-end"), ("study", "tank"), ("compare", "tank"),
+]  # fmt: skip
+
+
+def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Any plant that a command asks for is work begun."""
+    for name in ("registered_plants", "load_plant"):
+        monkeypatch.setattr(f"svo.plant.{name}", lambda *_: pytest.fail("the destination was not checked first"))
+
+
+@pytest.mark.parametrize("command", TO_A_FOLDER)
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    no_work(monkeypatch)
+    file = tmp_path / "results"
+    file.touch()
+    assert "results is a file; expected a folder for the results" in one_line(svo(*command, "--out", file))
+    assert f"cannot be made, since {file} is a file" in one_line(svo(*command, "--out", file / "more"))
+    monkeypatch.setattr("os.access", lambda path, mode: not mode & os.W_OK)
+    for folder in (tmp_path, tmp_path / "new" / "newer"):
+        message = one_line(svo(*command, "--out", folder))
+        assert f"{folder} cannot be written: no permission to write to {tmp_path};" in message
+    assert "cannot be written: no permission" in one_line(svo("report", tmp_path))
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("command", [("simulate", "tank"), ("design-input", "tank", "--fault=leak", "--horizon=3")])
+def test_a_file_that_cannot_be_written_is_refused_before_any_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    no_work(monkeypatch)
+    (tmp_path / "folder.csv").mkdir()
+    assert "folder.csv is a folder; expected the name of a file" in one_line(
+        svo(*command, "--out", tmp_path / "folder.csv")
+    )
+    assert f"there is no folder {tmp_path / 'no'}; make it" in one_line(
+        svo(*command, "--out", tmp_path / "no" / "x.csv")
+    )
+    assert "has the suffix '.txt'; expected" in one_line(svo(*command, "--out", tmp_path / "x.txt"))
+    (tmp_path / "x.csv").touch()
+    monkeypatch.setattr("os.access", lambda path, mode: not mode & os.W_OK)
+    assert "no permission to write to" in one_line(svo(*command, "--out", tmp_path / "x.csv"))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("simulate", "cart.toml", "--out", "x.csv"), ("study", "cart.toml", "--out", "x"), ("distinguish", "cart.toml"),
+        ("compare", "cart.toml", "--out", "x"), ("design-input", "cart.toml", "--fault=leak", "--horizon=3"),
+    ],
+)  # fmt: skip
+def test_a_description_where_a_plant_must_be_simulated_is_one_line(
+    registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    message = one_line(svo(*command))
+    assert message.startswith("error: cart.toml: a TOML file describes a model for logs")
+    assert "expected a registered one: eclipse, elevator, missile, tank" in message
+    assert "svo detect, svo watch or svo calibrate" in message
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_a_number_that_is_not_finite_is_refused(value: str) -> None:
+    for command in (["distinguish", "no"], ["design-input", "no", "--fault", "f", "--horizon", "3"]):
+        result = svo(*command, "--size", value)
+        assert result.exit_code == 2
+        assert f"Invalid value for '--size': {value} is not a finite number." in result.stderr
+    result = svo("compare", "no", "--out", "x", "--rate", value)
+    assert result.exit_code == 2
+    assert "Invalid value for '--rate'" in result.stderr
 
 
 def test_a_study_prints_its_table_and_writes_its_files(registered_tank: str, tmp_path: Path) -> None:
