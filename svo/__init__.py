@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from svo.isolation.record import BankRecord, Verdict
     from svo.log import Log
     from svo.model import UncertainModel
+    from svo.observers.chain import ChainCheck, LateMeasurement, prove_chain
     from svo.observers.polytope import PolytopeObserver
     from svo.observers.window import WindowObserver
     from svo.observers.zonotope import ConstrainedZonotopeObserver
@@ -26,9 +27,11 @@ __all__ = [
     "ArchitectureII",
     "BankRecord",
     "Calibration",
+    "ChainCheck",
     "ConstrainedZonotopeObserver",
     "Distinguishability",
     "InputDesign",
+    "LateMeasurement",
     "Log",
     "PolytopeObserver",
     "ScheduleTable",
@@ -39,6 +42,7 @@ __all__ = [
     "calibrate",
     "design_input",
     "distinguishability",
+    "prove_chain",
 ]
 
 _HOMES = {
@@ -46,9 +50,11 @@ _HOMES = {
     "ArchitectureII": "svo.isolation.architectures",
     "BankRecord": "svo.isolation.record",
     "Calibration": "svo.calibration",
+    "ChainCheck": "svo.observers.chain",
     "ConstrainedZonotopeObserver": "svo.observers.zonotope",
     "Distinguishability": "svo.distinguish",
     "InputDesign": "svo.input_design",
+    "LateMeasurement": "svo.observers.chain",
     "Log": "svo.log",
     "PolytopeObserver": "svo.observers.polytope",
     "ScheduleTable": "svo.schedule_table",
@@ -59,6 +65,7 @@ _HOMES = {
     "calibrate": "svo.calibration",
     "design_input": "svo.input_design",
     "distinguishability": "svo.distinguish",
+    "prove_chain": "svo.observers.chain",
 }
 
 

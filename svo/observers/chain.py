@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ChainCheck:
-    """What was found when a log was run again.
+    """What `prove_chain` found when it ran a log again.
 
     Attributes
     ----------
@@ -42,7 +42,9 @@ class ChainCheck:
     unproven : tuple of str
         Those whose proof did not hold: what and at which sample.
     certificate : WindowCertificate or None
+        Of the falsification.
     seconds : float
+        Time that it took.
     """
 
     proven: bool
@@ -74,9 +76,29 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
         With NaN where a measurement came late.
     late : iterable of LateMeasurement
         Those that did, in the order of their arrival.
+
+    Returns
+    -------
+    ChainCheck
+
+    Raises
+    ------
+    TypeError
+        If the observer is no `WindowObserver`: the sets of the others are not proven.
+    ValueError
+        If a late measurement arrived after the log's end, or before it was taken; and as `WindowObserver.step` and
+        `WindowObserver.late_update` do.
     """
+    if not isinstance(observer, WindowObserver):
+        raise TypeError(f"observer is a {type(observer).__name__}; expected a WindowObserver: only its bounds are proven")
     begun = perf_counter()
     waiting = list(late)
+    for i, measurement in enumerate(waiting):
+        if not 0 <= measurement.taken <= measurement.arrived < len(log):
+            raise ValueError(
+                f"late[{i}] was taken at sample {measurement.taken} and arrived after {measurement.arrived}; expected "
+                f"0 <= taken <= arrived <= {len(log) - 1}, the last sample of the log"
+            )
     again = ProvingObserver.like(observer)
     at = None
     for k in range(len(log)):

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polytopes import HPolytope
-from svo import UncertainModel, Uncertainty, WindowObserver
+from svo import LateMeasurement, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver, prove_chain
 from svo.log import Log
-from svo.observers.chain import prove_chain
 from tests.svo.observers.random_plants import random_plant
 
 
@@ -78,3 +77,14 @@ def test_a_healthy_log_proves_its_bounds_and_no_alarm() -> None:
     log = model.simulate([0.2], np.zeros((20, 0)), np.random.default_rng(0))
     chain = prove_chain(WindowObserver(model, HPolytope.box([-1.0], [1.0])), log)
     assert (chain.proven, chain.falsified_at, chain.unproven) == (False, None, ())
+
+
+def test_what_cannot_be_proven_is_refused() -> None:
+    model = UncertainModel([[0.9]], None, [[1.0]], n=[0.1])
+    log, start = Log(np.arange(4.0), np.zeros((4, 0)), np.zeros((4, 1))), HPolytope.box([-1.0], [1.0])
+    with pytest.raises(TypeError, match="observer is a PolytopeObserver; expected a WindowObserver"):
+        prove_chain(PolytopeObserver(model, start), log)  # type: ignore[arg-type]
+    for taken, arrived in ((2, 4), (3, 2), (-1, 2)):
+        late = LateMeasurement(arrived=arrived, taken=taken, y=np.zeros(1))
+        with pytest.raises(ValueError, match=rf"late\[0\] was taken at sample {taken} .* 0 <= taken <= arrived <= 3"):
+            prove_chain(WindowObserver(model, start), log, [late])
