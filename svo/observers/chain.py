@@ -90,7 +90,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
         `WindowObserver.late_update` do.
     """
     if not isinstance(observer, WindowObserver):
-        raise TypeError(f"observer is a {type(observer).__name__}; expected a WindowObserver: only its bounds are proven")
+        raise TypeError(f"observer is a {type(observer).__name__}; expected a WindowObserver, the only kind proven")
     begun = perf_counter()
     waiting = list(late)
     for i, measurement in enumerate(waiting):
