@@ -1,4 +1,7 @@
-"""What a user hands to an observer: checks of a sample's data, and the samples of a log."""
+"""What a user hands to an observer: checks of a sample's data, and the samples of a log.
+
+The window observer looks at shapes here and at the numbers in its kernel.
+"""
 
 from __future__ import annotations
 
@@ -14,18 +17,24 @@ from svo.model import UncertainModel
 Array = NDArray[np.float64]
 
 
-def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:
-    """A measurement (ny,), NaN where a sensor is missing."""
+def outputs_shaped(model: UncertainModel, y: ArrayLike) -> Array:
+    """A measurement (ny,) whose numbers have not been looked at."""
     array = np.asarray(y, dtype=float)
     if array.shape != (model.n_outputs,):
         raise ValueError(f"y has shape {array.shape}; expected ({model.n_outputs},), one value a sensor")
+    return array
+
+
+def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:
+    """A measurement (ny,), NaN where a sensor is missing."""
+    array = outputs_shaped(model, y)
     if np.isinf(array).any():
         raise ValueError(f"y is {array}; expected finite numbers, or NaN for a missing sensor")
     return array
 
 
-def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: bool) -> Array:
-    """An input (nu,); zeros where it is not needed."""
+def inputs_shaped(model: UncertainModel, name: str, u: ArrayLike | None, needed: bool) -> Array:
+    """An input (nu,) whose numbers have not been looked at; zeros where it is not needed."""
     size = model.n_inputs
     if not needed or (u is None and size == 0):
         return np.zeros(size)
@@ -33,15 +42,28 @@ def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: boo
         why = ", since D, a D_i or a channel shares it with the output" if name != "u" else ""
         raise ValueError(f"{name} is missing; expected shape ({size},){why}")
     array = np.asarray(u, dtype=float)
-    if array.shape != (size,) or not np.isfinite(array).all():
-        raise ValueError(f"{name} has shape {array.shape}; expected finite numbers of shape ({size},)")
+    if array.shape != (size,):
+        raise ValueError(f"{name} has shape {array.shape}; expected ({size},), one value an input")
     return array
+
+
+def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: bool) -> Array:
+    """An input (nu,); zeros where it is not needed."""
+    array = inputs_shaped(model, name, u, needed)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} is {array}; expected finite numbers")
+    return array
+
+
+def check_schedule(model: UncertainModel, schedule: Any) -> None:
+    """Raise an error if a model needs a schedule and there is none."""
+    if model.is_scheduled and schedule is None:
+        raise ValueError("schedule is missing: the model has arrays that are functions of it, so pass schedule=...")
 
 
 def stack_at(model: UncertainModel, schedule: Any) -> Array:
     """The stack of a model at a sample, all finite."""
-    if model.is_scheduled and schedule is None:
-        raise ValueError("schedule is missing: the model has arrays that are functions of it: pass schedule=...")
+    check_schedule(model, schedule)
     stack = model.stack(schedule)
     if not np.isfinite(stack).all():
         raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected numbers")

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from svo.model import UncertainModel
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_from
 from svo.observers.window_kernel import BASE, TIME, Sizes
+from svo.observers.window_setup import may_be_nonzero
 
 Array = NDArray[np.float64]
 _UNIT = 1.1102230246251565e-16
@@ -34,8 +35,7 @@ def can_inject(model: UncertainModel) -> bool:
         return False
     if model.disturbance_polytope is not None:
         return False
-    uncertain = [array for u in model.uncertainties for array in (u.E, u.C, u.D, u.c, u.F)]
-    if any(callable(array) or (array is not None and np.any(array)) for array in uncertain):
+    if may_be_nonzero(*(array for u in model.uncertainties for array in (u.E, u.C, u.D, u.c, u.F))):
         return False
     gains = _gains(model.stack(model.schedule)[0], model.n_states, model.n_inputs)
     if gains is None:

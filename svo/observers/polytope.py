@@ -18,6 +18,7 @@ from svo.observers.polytope_sets import Outcome, PublishedRecursion, Recursion, 
 from svo.observers.polytope_state import read_outcome, read_sample, read_set, write_outcome, write_sample, write_set
 from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
 from svo.observers.vertex_images import transitions
+from svo.observers.window_setup import check_first_states, may_be_nonzero
 
 Array = NDArray[np.float64]
 _PUBLISHED_STACKS = 4096
@@ -84,7 +85,7 @@ class PolytopeObserver:
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        coupled = _has_any(model.F, *(item.F for item in model.uncertainties))
+        coupled = may_be_nonzero(model.F, *(item.F for item in model.uncertainties))
         smallest = 2 * (model.n_states + (model.n_disturbances if coupled else 0))
         if max_facets is not None and (not isinstance(max_facets, int | np.integer) or max_facets < smallest):
             raise ValueError(
@@ -240,12 +241,8 @@ class PolytopeObserver:
         return Sample(number, stack, disturbances, noise, u, outputs)
 
 
-def _has_any(*arrays: Any) -> bool:
-    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
-
-
 def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None:
-    if coupled or _has_any(*(array for item in model.uncertainties for array in (item.C, item.D, item.c))):
+    if coupled or may_be_nonzero(*(array for item in model.uncertainties for array in (item.C, item.D, item.c))):
         raise ValueError("as_published is True, but equation (3) has neither F nor an uncertain output: leave it out")
     stacks = 2 ** (horizon * len(model.uncertainties))
     if stacks > _PUBLISHED_STACKS:
@@ -255,11 +252,6 @@ def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None
 
 
 def _check_initial(P: HPolytope, n: int) -> None:
-    if not isinstance(P, HPolytope):
-        raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
-    if P.dim != n:
-        raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
-    if P.emptiness().status != "nonempty":
-        raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
+    check_first_states(P, n)
     if not P.is_bounded():
         raise ValueError("initial is unbounded; expected a bounded set of first states, such as a box")

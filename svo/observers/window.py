@@ -14,7 +14,7 @@ from polytopes import HPolytope
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
-from svo.observers.data import steps_of
+from svo.observers.data import check_schedule, inputs_shaped, outputs_shaped, steps_of
 from svo.observers.proof import ArrivalSet
 from svo.observers.window_programs import ENTRY_ERRORS, WindowPrograms
 from svo.observers.window_setup import (
@@ -112,8 +112,8 @@ class WindowObserver(WindowPrograms):
         begun = perf_counter()
         if self._started:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        y = self._outputs(y0)
-        inputs = self._inputs("u", u, self._wants_next_input)
+        y = outputs_shaped(self.model, y0)
+        inputs = inputs_shaped(self.model, "u", u, self._wants_next_input)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
         return self._sample(True, np.zeros(self.model.n_inputs), inputs, y, stack, noise, (w_lower, w_upper), begun)
 
@@ -152,9 +152,9 @@ class WindowObserver(WindowPrograms):
         begun = perf_counter()
         if self._falsified is not None:
             return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
-        outputs = self._outputs(y)
-        inputs = self._inputs("u", u, True)
-        following = self._inputs("u_next", u_next, self._wants_next_input)
+        outputs = outputs_shaped(self.model, y)
+        inputs = inputs_shaped(self.model, "u", u, True)
+        following = inputs_shaped(self.model, "u_next", u_next, self._wants_next_input)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
         if not self._started:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
@@ -186,7 +186,7 @@ class WindowObserver(WindowPrograms):
         self.check_late(y, sample)
         if self._falsified is not None:
             return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
-        outputs = self._outputs(y)
+        outputs = outputs_shaped(self.model, y)
         kernel.add_late(self._window, self._size, sample, outputs, self.eps)
         if self._injection is not None:  # the sample was incomplete, so it is as it was given
             s = sample % (self._size.N + 1)
@@ -196,7 +196,7 @@ class WindowObserver(WindowPrograms):
 
     def check_late(self, y: ArrayLike, sample: int) -> None:
         """Raise what `late_update` would raise; nothing changes."""
-        outputs = self._outputs(y)
+        outputs = outputs_shaped(self.model, y)
         if self._falsified is not None:
             return
         first, last = self.window
@@ -299,29 +299,8 @@ class WindowObserver(WindowPrograms):
     # -- inside ----------------------------------------------------------------------------------
 
     def _evaluate(self, schedule: Any) -> tuple[Array, tuple[Array, Array, Array]]:
-        if self.model.is_scheduled and schedule is None:
-            raise ValueError("schedule is missing: the model has arrays that are functions of it, so pass schedule=...")
+        check_schedule(self.model, schedule)
         return self.model.stack(schedule), self.model.bounds(schedule)
-
-    def _outputs(self, y: ArrayLike) -> Array:
-        array = np.asarray(y, dtype=float)
-        if array.shape != (self.model.n_outputs,):
-            raise ValueError(f"y has shape {array.shape}; expected ({self.model.n_outputs},), one value a sensor")
-        return array
-
-    def _inputs(self, name: str, u: ArrayLike | None, needed: bool) -> Array:
-        size = self.model.n_inputs
-        if not needed or (u is None and size == 0):
-            return np.zeros(size)
-        if u is None:
-            raise ValueError(
-                f"{name} is missing; expected shape ({size},)"
-                + (", since the output shares D, a D_i or a channel with the input" if name != "u" else "")
-            )
-        array = np.asarray(u, dtype=float)
-        if array.shape != (size,):
-            raise ValueError(f"{name} has shape {array.shape}; expected ({size},), one value an input")
-        return array
 
     def _sample(
         self,

@@ -14,6 +14,7 @@ from svo.observers.window_setup import (
     channel_owners,
     jitter,
     joint_rows,
+    needs_next_input,
     output_is_disturbed,
 )
 
@@ -48,9 +49,7 @@ class WindowMemory:
         self._late = output_is_disturbed(model)
         sizes = model.n_states, model.n_inputs, model.n_disturbances
         self._injection = OutputInjection(*sizes) if can_inject(model) else None
-        # Channels that the output may share are bounded at its sample, so what u says of them must be known then.
-        driven = any(callable(u.B) or (u.B is not None and bool(np.any(u.B))) for u in model.uncertainties)
-        self._wants_next_input = model.uses_input_in_output or (self._late and driven)
+        self._wants_next_input = needs_next_input(model)
 
     @property
     def _first_steps(self) -> int:

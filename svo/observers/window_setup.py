@@ -1,6 +1,8 @@
-"""What a window observer works out once: its template, its channels, its set of first states."""
+"""What an observer works out once: its template, its channels, what its output depends on, its set of first states."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,10 +38,23 @@ def channel_owners(model: UncertainModel) -> NDArray[np.int64]:
     return np.array(owners, dtype=np.int64)
 
 
+def may_be_nonzero(*arrays: Any) -> bool:
+    """Whether any of a model's arrays is there and not zero; a function of the schedule may be anything."""
+    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
+
+
 def output_is_disturbed(model: UncertainModel) -> bool:
     """Whether w or a channel may enter the output, at whatever schedule."""
-    arrays = [model.F, *(array for u in model.uncertainties for array in (u.C, u.D, u.c, u.F))]
-    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
+    return may_be_nonzero(model.F, *(array for u in model.uncertainties for array in (u.C, u.D, u.c, u.F)))
+
+
+def needs_next_input(model: UncertainModel) -> bool:
+    """Whether a step needs u(k+1), for an observer whose output and state share w and the channels.
+
+    Channels that the output may share are bounded at its sample, so what u says of them must be known then.
+    """
+    driven = may_be_nonzero(*(u.B for u in model.uncertainties))
+    return model.uses_input_in_output or (output_is_disturbed(model) and driven)
 
 
 def joint_rows(P: HPolytope) -> tuple[Array, Array, Array]:
@@ -51,14 +66,19 @@ def joint_rows(P: HPolytope) -> tuple[Array, Array, Array]:
     return rows[joint], lower[joint], upper[joint]
 
 
-def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
-    """Bounds of a set of first states, rounded outward where they had to be computed."""
+def check_first_states(P: HPolytope, n: int) -> None:
+    """Raise an error unless a set of first states is one, of n states, and not empty."""
     if not isinstance(P, HPolytope):
         raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
     if P.dim != n:
         raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
     if P.emptiness().status != "nonempty":
         raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
+
+
+def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
+    """Bounds of a set of first states, rounded outward where they had to be computed."""
+    check_first_states(P, n)
     lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
         raise ValueError(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.observers.data import directions_of
 from svo.observers.proof import WindowCertificate
 from svo.observers.sign_split import SplitCertificate
 from svo.observers.step import VerdictName
@@ -70,10 +71,7 @@ class WindowStep:
         (k,) array
             -inf once the model is falsified.
         """
-        rows = np.asarray(directions, dtype=float)
-        n = self.observer.model.n_states
-        if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
-            raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {n})")
+        rows = directions_of(directions, self.observer.model.n_states)
         return self.observer._support_at(self.sample, rows)
 
 

@@ -17,6 +17,7 @@ from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.proof import WindowSample
 from svo.observers.step import VerdictName
+from svo.observers.window_setup import needs_next_input
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate
 from svo.observers.zonotope_reduction import reduced
@@ -74,9 +75,7 @@ class ConstrainedZonotopeObserver:
         self.max_generators = _limit("max_generators", max_generators, 8 * n, n)
         self.max_constraints = _limit("max_constraints", max_constraints, 3 * n, 0)
         self._builder = StageBuilder(model, self.eps)
-        # Channels that the output may share are bounded at its sample, so what u says of them must be known then.
-        driven = any(callable(item.B) or bool(np.any(item.B)) for item in model.uncertainties if item.B is not None)
-        self._wants_next_input = model.uses_input_in_output or (self._builder.is_late and driven)
+        self._wants_next_input = needs_next_input(model)
         self.reset(initial)
 
     # -- the protocol ----------------------------------------------------------------------------
