@@ -21,6 +21,7 @@ Kind = Literal["noise", "disturbance", "Delta"]
 # Of the data, as the observers do: y = fl(C x + n) on a bound need not satisfy it. Theirs is a little wider.
 ROUNDING = 1e-9
 _HIGH_PRICE = 1e3
+_LARGEST = 1e18  # relative to the noise: HiGHS takes 1e20 for infinity
 _KINDS: dict[str, Kind] = {"noise": "noise", "disturbances": "disturbance", "deltas": "Delta"}
 
 
@@ -167,6 +168,11 @@ class _Elastic:
         if i is not None:
             width += self.scales[i] * self.allowed[i]
         unit = noise or 1.0  # rows of about size one, for the solver's absolute tolerance
+        if abs(float(y)) / float(unit) > _LARGEST:
+            raise ValueError(
+                f"y of the log has the value {y:g} of sensor {sensor}, over {_LARGEST:g} times its noise; "
+                "no program can hold that, so where it stands for a missing measurement, leave the cell empty (NaN)"
+            )
         row = [(columns, matrix / unit) for columns, matrix in terms]
         above, below = [*row, (self.common, np.ones((1, 1)))], [*row, (self.common, -np.ones((1, 1)))]
         if i is not None:

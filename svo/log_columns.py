@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,6 +42,7 @@ def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> lis
         raise ValueError(
             f"{source} has no column {', '.join(repr(name) for name in missing)}; "
             f"expected the columns {', '.join(needed)}, found {', '.join(map(str, present))}"
+            + _meant(missing[0], [str(name) for name in present if name not in needed])
         )
     states = [c.name for c in columns.states]
     wanted = needed + (states if all(name in present for name in states) else [])
@@ -50,13 +52,21 @@ def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> lis
     return wanted
 
 
+def _meant(missing: str, others: Sequence[str]) -> str:
+    """The column that may stand there under another spelling, or with its unit."""
+    bare = {name.partition("[")[0].partition("(")[0].strip().lower(): name for name in others}
+    close = get_close_matches(missing.lower(), bare, n=1)
+    return f". Is {bare[close[0]]!r} meant? Then rename it to {missing!r}" if close else ""
+
+
 def may_be_missing(columns: Columns) -> frozenset[str]:
     """Columns in which NaN has a meaning."""
     return frozenset(c.name for c in columns.outputs + columns.states)
 
 
 def not_finite(where: str, cell: object) -> ValueError:
-    return ValueError(f"{where}: {cell!r} is not a finite number")
+    hint = "; write a decimal point" if isinstance(cell, str) and "," in cell else ""
+    return ValueError(f"{where}: {cell!r} is not a finite number{hint}")
 
 
 def not_there(where: str) -> ValueError:
@@ -99,10 +109,11 @@ def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError
     step = f"{where}: time goes from {before:.9g} s to {after:.9g} s"
     if after <= before:
         return ValueError(f"{step}; expected increasing times, so sort the rows and drop doubles")
-    return ValueError(
-        f"{step}, a step of {after - before:.6g} s; expected the model's sampling time {Ts:.6g} s. "
-        "Resample the log; a lost sample is a row with empty sensor cells"
-    )
+    found = f"{step}, a step of {after - before:.6g} s; expected the model's sampling time {Ts:.6g} s. "
+    for unit, seconds in (("milliseconds", 1e-3), ("microseconds", 1e-6)):
+        if is_sampled(before * seconds, after * seconds, Ts):
+            return ValueError(f"{found}The column seems to be in {unit}; divide it by {1 / seconds:g}")
+    return ValueError(f"{found}Resample the log; a lost sample is a row with empty sensor cells")
 
 
 def is_sampled(before: float, after: float, Ts: float) -> bool:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
@@ -44,6 +44,9 @@ def read_csv(path: Path, columns: Columns, Ts: float) -> Log:
     return assemble(str(path), cells, columns, Ts, lambda k: f"line {lines[k]}")
 
 
+DIALECT: dict[str, Any] = {"strict": True, "skipinitialspace": True}  # of `csv.reader`
+
+
 class RowParser:
     """Turns the rows under one header into numbers, in the order of ``names``.
 
@@ -57,6 +60,7 @@ class RowParser:
         if not header:
             raise ValueError(f"{source} is empty; expected a header line with column names and one row a sample")
         present = [name.strip() for name in header]
+        _check_separator(source, present, columns)
         self.names = wanted_columns(source, present, columns)
         self._source, self._width = source, len(present)
         self._where = [present.index(name) for name in self.names]
@@ -91,6 +95,16 @@ class RowParser:
         return f"{self._source}, line {line}, column {self.names[i]!r}"
 
 
+def _check_separator(source: str, present: Sequence[str], columns: Columns) -> None:
+    """Refuse a header that another separator than the comma would split."""
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(present) == 1 and columns.time in [cell.strip(' "') for cell in present[0].split(separator)]:
+            raise ValueError(
+                f"{source} has no column {columns.time!r}: its header {present[0]!r} is split by {name}; "
+                "expected commas between the cells, and a decimal point in numbers"
+            )
+
+
 @contextmanager
 def csv_errors(source: str) -> Iterator[None]:
     """Say of bytes that are no CSV text what they are not."""
@@ -104,7 +118,7 @@ def csv_errors(source: str) -> Iterator[None]:
 
 def _rows(file: TextIO) -> Iterator[tuple[int, list[str]]]:
     """Line numbers and cells of the rows that are not blank."""
-    reader = csv.reader(file)
+    reader = csv.reader(file, **DIALECT)
     for row in reader:
         if row:
             yield reader.line_num, row

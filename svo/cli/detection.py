@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from svo.cli.destinations import writable_folder
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors
+from svo.cli.frame import PREPARING, announce, app, chosen_noise, measured_log, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName
 from svo.cli.output import print_detection, print_json
 
@@ -38,13 +38,12 @@ def detect(
         from svo.description import find_plant, keep_description
         from svo.detect import detect as run_detection
         from svo.detect import write_detection
-        from svo.log_file import read_log
         from svo.plant import DetectsThresholds, in_architecture
         from svo.progress import progress
 
         the_plant = in_architecture(find_plant(plant), architecture)
         noise = chosen_noise(the_plant, noise)
-        samples = read_log(log, the_plant.columns, the_plant.Ts)
+        samples = measured_log(log, the_plant)
         announce(PREPARING)
         with progress("Samples") as update:
             found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
@@ -133,11 +132,10 @@ def calibrate(
     with one_line_errors():
         from svo.description import find_plant
         from svo.log_calibration import calibrate_log
-        from svo.log_file import read_log
 
         the_plant = find_plant(plant)
         noise = chosen_noise(the_plant, noise)
-        samples = read_log(log, the_plant.columns, the_plant.Ts)
+        samples = measured_log(log, the_plant)
         announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
         found = calibrate_log(the_plant, samples, noise)
         if as_json:

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from svo.log import Log
     from svo.plant import MonitoredPlant, Plant
 
 app = typer.Typer(
@@ -53,6 +56,24 @@ def plant_to_simulate(name: str) -> Plant:
             "own')"
         )
     return load_plant(name)
+
+
+def measured_log(path: Path, plant: MonitoredPlant) -> Log:
+    """A log to judge a plant by: sensors that it never measured are noted, and one has to be there."""
+    import numpy as np
+
+    from svo.log_file import read_log
+
+    log = read_log(path, plant.columns, plant.Ts)
+    silent = [column.name for column, y in zip(plant.columns.outputs, log.y.T, strict=True) if np.isnan(y).all()]
+    if len(silent) == len(plant.columns.outputs):
+        raise ValueError(
+            f"{path} has no measurement: {', '.join(map(repr, silent))} empty in every row; expected numbers in one of "
+            "these columns at least"
+        )
+    for name in silent:
+        typer.echo(f"note: {path} has no measurement of {name!r}; nothing is concluded from that sensor", err=True)
+    return log
 
 
 def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:

@@ -15,7 +15,7 @@ from svo.alarms import Alarm
 from svo.detect import source_of_bank
 from svo.isolation.record import Verdict
 from svo.log_columns import is_sampled, wrong_step
-from svo.log_csv import RowParser, csv_errors
+from svo.log_csv import DIALECT, RowParser, csv_errors
 from svo.plant import MonitoredPlant, schedule_of
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ class Session:
         if not line.strip():
             return []
         with csv_errors(f"{self.source}, line {self._line}:"):
-            cells = next(csv.reader([line], strict=True))
+            cells = next(csv.reader([line], **DIALECT))
         if self._parser is None:
             self._parser = RowParser(self.source, cells, self.plant.columns)
             return []

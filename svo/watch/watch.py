@@ -25,6 +25,11 @@ def watch(lines: Lines, session: Session, view: View, *, keep: Callable[[Alarm],
     view : View
     keep : callable, optional
         Called with each alarm when it is raised.
+
+    Raises
+    ------
+    ValueError
+        For a bad line, and if the lines end before the first sample.
     """
     why = "Stopped by an error"
     with _interruption() as interrupted:
@@ -36,6 +41,8 @@ def watch(lines: Lines, session: Session, view: View, *, keep: Callable[[Alarm],
                     view.alarm(alarm)
                 view.show(session.status, waiting)
             why = "Interrupted" if interrupted.is_set() else "End of the input"
+            if session.status() is None and not interrupted.is_set():
+                raise ValueError(f"{lines.name} ended without a sample; expected a header line and one row a sample")
         finally:
             view.close(session.status(), why)
             lines.close()

@@ -166,6 +166,14 @@ def test_a_wrong_argument_is_named(changes: dict[str, Any], message: str) -> Non
         calibrate(**arguments)
 
 
+@pytest.mark.parametrize("value", [3.4e38, 1e308])
+def test_the_marker_of_a_missing_value_is_not_taken_for_a_measurement(value: float) -> None:
+    log = healthy(model())
+    log.y[4, 0] = value
+    with pytest.raises(ValueError, match="leave the cell empty"):
+        calibrate(model(), log, START)
+
+
 def simulated(folder: Path) -> Path:
     path = folder / "log.csv"
     assert CliRunner().invoke(app, ["simulate", "tank", "--noise", "calm", "--out", str(path)]).exit_code == 0

@@ -154,6 +154,19 @@ def test_a_missing_measurement_is_no_alarm_and_no_error(registered_tank: str, tm
     assert "No fault" in svo("detect", "tank", path).stdout
 
 
+def test_a_log_that_measures_nothing_is_no_healthy_one(log: Path) -> None:
+    rows = [row.split(",") for row in log.read_text().splitlines()]
+    for name in ("gauge_1", "gauge_2"):
+        for row in rows[1:]:
+            row[rows[0].index(name)] = ""
+        log.write_text("".join(",".join(row) + "\n" for row in rows))
+        if name == "gauge_1":
+            assert "note:" in svo("detect", "tank", log).stderr
+            assert "no measurement of 'gauge_1'" in svo("calibrate", "tank", log).stderr
+    for command in ("detect", "calibrate"):
+        assert "has no measurement: 'gauge_1', 'gauge_2' empty in every row" in one_line(svo(command, "tank", log))
+
+
 @pytest.mark.parametrize(
     ("line", "column", "cell", "expected"),
     [

@@ -61,7 +61,12 @@ def test_columns_are_found_by_name_and_others_are_ignored(tmp_path: Path) -> Non
 
 
 def test_spreadsheet_habits_are_understood(tmp_path: Path) -> None:
-    path = written(tmp_path, b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").replace(",", ", ").encode() + b"\r\n")
+    path = written(
+        tmp_path,
+        b"\xef\xbb\xbf"
+        + GOOD.replace("gauge_1", '"gauge_1"').replace("\n", "\r\n").replace(",", ", ").encode()
+        + b"\r\n",
+    )
     assert len(read_log(path, COLUMNS, 0.1)) == 3
 
 
@@ -81,8 +86,13 @@ def test_an_unknown_state_is_no_error(tmp_path: Path) -> None:
         ("", ["is empty"]),
         ("\n\n", ["is empty"]),
         (HEADER, ["no samples"]),
-        (GOOD.replace("gauge_1", "gauge1"), ["no column 'gauge_1'", "gauge1"]),
-        (GOOD.replace(",", ";"), ["no column 'time_s'", "time_s;flow"]),
+        (GOOD.replace("gauge_1", "gauge1"), ["no column 'gauge_1'", "Is 'gauge1' meant? Then rename it to 'gauge_1'"]),
+        (GOOD.replace("flow", "Flow [m3/s]"), ["no column 'flow'", "Is 'Flow [m3/s]' meant?"]),
+        (GOOD.replace("flow", "voltage"), ["no column 'flow'", "found time_s, voltage, gauge_1, gauge_2, level"]),
+        (GOOD.replace(",", ";"), ["no column 'time_s'", "time_s;flow", "split by semicolons; expected commas"]),
+        (GOOD.replace(",", "\t"), ["no column 'time_s'", "split by tabs; expected commas"]),
+        (GOOD.replace("0.1,1,2", '0.1,1,"2,5"'), ["line 3", "'2,5' is not a finite number; write a decimal point"]),
+        (GOOD.replace("0.1,1,2", '0.1,1,"2'), ["not a CSV text file"]),
         (GOOD.replace("level", "flow"), ["more than one column 'flow'"]),
         (GOOD.replace("0.1,1,2,3,4", "0.1,1,2,3"), ["line 3", "4 cells", "expected 5"]),
         (GOOD.replace("0.1,1,2", "0.1,1,two"), ["line 3", "'gauge_1'", "'two'", "not a finite number"]),
@@ -94,6 +104,8 @@ def test_an_unknown_state_is_no_error(tmp_path: Path) -> None:
         (GOOD.replace("0.2", "0.1"), ["line 4", "increasing"]),
         (GOOD.replace("0.2", "0.05"), ["line 4", "increasing"]),
         (GOOD.replace("0.2", "0.3"), ["line 4", "step of 0.2 s", "sampling time 0.1 s"]),
+        (GOOD.replace("0.1,", "100,"), ["line 3", "The column seems to be in milliseconds; divide it by 1000"]),
+        (GOOD.replace("0.1,", "100000,"), ["line 3", "seems to be in microseconds; divide it by 1e+06"]),
         (b"\xff\xfe\x00\x01time", ["not a CSV text file"]),
         (b"PK\x03\x04\x00\x9c\xff", ["not a CSV text file"]),
     ],

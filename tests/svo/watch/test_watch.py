@@ -139,6 +139,15 @@ def test_a_bad_row_ends_the_command_with_one_line(tmp_path: Path) -> None:
     assert "Traceback" not in result.output
 
 
+@pytest.mark.parametrize("text", ["", "\n\n", "time_s,force,position\n"])
+def test_a_log_that_ends_without_a_sample_is_an_error(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    result = CliRunner().invoke(app, ["watch", str(CART), str(path), "--until-end"])
+    assert result.exit_code == 1
+    assert f"error: {path} ended without a sample; expected a header line" in result.stderr
+
+
 def test_an_interrupt_is_a_clean_end(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(LOG.read_text())
