@@ -15,6 +15,7 @@ from svo.checks import finite_array
 from svo.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
+_ROUNDED_UP = 1e-9  # relative
 
 
 def zero_order_hold(A: ArrayLike, B: ArrayLike, Ts: float) -> tuple[Array, Array]:
@@ -44,9 +45,7 @@ def discretise(
     ValueError
         Naming the array, its shape and the expected one, or the ``remainder`` that is missing.
     """
-    A = finite_array("A", A)
-    if A.ndim != 2 or A.shape[0] != A.shape[1]:
-        raise ValueError(f"A has shape {A.shape}; expected a square matrix (n, n)")
+    A = _square(A)
     n = len(A)
     given = {name: _of_rows(name, v, n) for name, v in (("B", B), ("a", a), ("E", E)) if v is not None}
     held = {name: zero_order_hold(A, v.reshape(n, -1), Ts)[1].reshape(v.shape) for name, v in given.items()}
@@ -58,9 +57,90 @@ def discretise(
         return out | _with_remainder(w, out["E"], F, discrete, remainder, n)
     if any(getattr(u, name) is not None for u in uncertainties for name in ("A", "B", "a", "E")):
         raise ValueError(
-            f"remainder is missing: give the bound ({n},) of what the first-order discretisation leaves out"
+            f"remainder is missing: give the bound ({n},) of what the first-order discretisation leaves out; bounds of "
+            "|x| and |u| are enough to compute it (svo.discretisation.remainder_bound; in a TOML file "
+            "remainder = {states = [...], inputs = [...]})"
         )
     return out
+
+
+def remainder_bound(
+    A: ArrayLike,
+    B: ArrayLike | None,
+    *,
+    Ts: float,
+    x: ArrayLike,
+    u: ArrayLike | None = None,
+    E: ArrayLike | None = None,
+    a: ArrayLike | None = None,
+    w: Any = None,
+    uncertainties: Sequence[Uncertainty],
+) -> Array:
+    """What `UncertainModel.from_continuous` leaves out of a sample at most, for each Delta held over a sample.
+
+    By variation of constants that is the sum of int_0^Ts exp(A (Ts - t)) Delta_i A_i (x(t) - x(0)) dt. Entry by entry
+    |exp(A t)| <= exp(|A| t), and |x(t) - x(0)| <= t v with v a bound of |dx/dt| over the bounds of x, u, w and Delta.
+
+    Parameters
+    ----------
+    A, B, E, a, w, uncertainties
+        As for `UncertainModel.from_continuous`.
+    Ts : float
+        Sampling time [s].
+    x, u : (n,), (nu,) arrays
+        Largest |x| that the state has at any time (between the samples too), and largest |u|.
+
+    Returns
+    -------
+    (n,) array
+
+    Raises
+    ------
+    ValueError
+        Naming the array, its shape and the expected one.
+    """
+    A = _square(A)
+    n = len(A)
+    reach = {"A": _largest("x", x, n)}
+    reach["B"] = _largest("u", u, 0 if B is None else np.shape(B)[-1])
+    reach["E"] = np.maximum(*(np.abs(edge) for edge in _bounds(w, 0 if E is None else np.shape(E)[-1])))
+    reach["a"] = np.ones(1)
+
+    def rate(arrays: dict[str, Any], what: str = "") -> Array:
+        """Largest absolute value of the terms of dx/dt that the arrays make."""
+        total = np.zeros(n)
+        for name, value in arrays.items():
+            if value is not None:
+                total += np.abs(_of_rows(f"{name}{what}".rstrip(), value, n).reshape(n, -1)) @ reach[name]
+        return total
+
+    speed, gain = rate({"A": A, "B": B, "a": a, "E": E}), np.zeros((n, n))
+    for item in uncertainties:
+        if any(callable(getattr(item, name)) for name in reach):
+            raise ValueError("an array of an uncertainty is a function; remainder_bound takes constant arrays")
+        largest = np.abs(item.bounds).max()
+        speed += largest * rate({name: getattr(item, name) for name in reach}, f" of uncertainty {item.name}")
+        if item.A is not None:
+            gain += largest * np.abs(np.asarray(item.A, dtype=float))
+    # int_0^Ts exp(|A| (Ts - t)) t dt is the last block of the first row of the exponential of a nilpotent extension.
+    zero, one = np.zeros((n, n)), np.eye(n)
+    joint = expm(np.block([[np.abs(A), one, zero], [zero, zero, one], [zero, zero, zero]]) * Ts)
+    return joint[:n, 2 * n :] @ gain @ speed * (1.0 + _ROUNDED_UP)
+
+
+def _largest(name: str, value: ArrayLike | None, size: int) -> Array:
+    """Largest absolute values (size,)."""
+    array = finite_array(name, np.zeros(0) if value is None else value)
+    if array.shape != (size,) or (array < 0).any():
+        raise ValueError(f"{name} is {array}; expected the largest absolute values, shape ({size},)")
+    return array
+
+
+def _square(A: ArrayLike) -> Array:
+    array = finite_array("A", A)
+    if array.ndim != 2 or array.shape[0] != array.shape[1]:
+        raise ValueError(f"A has shape {array.shape}; expected a square matrix (n, n)")
+    return array
 
 
 def _of_rows(name: str, value: ArrayLike, n: int) -> Array:

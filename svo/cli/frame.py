@@ -32,8 +32,10 @@ def one_line_errors() -> Iterator[None]:
         yield
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
-    except (ValueError, TypeError, RuntimeError, ImportError) as error:
+    except (ValueError, TypeError, RuntimeError, ImportError, OverflowError) as error:
         fail(str(error))
+    except MemoryError as error:
+        fail(f"not enough memory ({error}); take a shorter horizon, or fewer samples or workers")
     except KeyboardInterrupt:
         fail("interrupted; the runs of a study that are done are kept, and --resume goes on", code=130)
 

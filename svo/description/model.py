@@ -10,6 +10,7 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.description.table import Table
+from svo.discretisation import remainder_bound
 from svo.model import UncertainModel
 from svo.model_file import read_arrays
 from svo.uncertainty import Uncertainty
@@ -29,16 +30,32 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
             raise table.error(key, "is missing; expected a matrix such as [[0.9]]")
     uncertainties = [_uncertainty(entry) for entry in table.tables("uncertainties", _UNCERTAINTY)]
     rest: dict[str, Any] = {"Ts": top.number("Ts"), "uncertainties": uncertainties}
-    if "remainder" in table:
-        rest["remainder"] = table.array("remainder")
     continuous = table.truth("continuous", False)
     if not continuous and "remainder" in table:
         raise table.error("remainder", "has no meaning for a discrete model; drop it, or say continuous = true")
+    if "remainder" in table:
+        rest["remainder"] = _remainder(table, arrays, rest)
     with table.errors():
-        if continuous:
-            rest |= {"B": arrays.pop("B", None)}
-            return UncertainModel.from_continuous(**arrays, **rest, names=names)
-        return UncertainModel(**{"B": None} | arrays, **rest, names=names)
+        make = UncertainModel.from_continuous if continuous else UncertainModel
+        model = make(**{"B": None} | arrays, **rest)
+    sizes = {"inputs": model.n_inputs, "outputs": model.n_outputs, "states": model.n_states}
+    for group, columns in names.items():
+        if len(columns) != sizes[group]:
+            raise top.table("columns").error(
+                group, f"names {len(columns)} columns; expected {sizes[group]}, the number of {group} of [model]"
+            )
+    return model.replace(names=names)
+
+
+def _remainder(table: Table, arrays: Mapping[str, Any], rest: Mapping[str, Any]) -> Any:
+    """As given, or computed from bounds of the states and inputs."""
+    if not isinstance(table.content["remainder"], dict):
+        return table.array("remainder")
+    reach = table.table("remainder", ("states", "inputs"))
+    x, u = reach.array("states"), reach.array("inputs") if "inputs" in reach else None
+    continuous = {name: arrays.get(name) for name in ("A", "B", "E", "a", "w")}
+    with reach.errors():
+        return remainder_bound(**continuous, **rest, x=x, u=u)  # type: ignore[arg-type]
 
 
 def arrays_of(table: Table) -> dict[str, Any]:
@@ -98,4 +115,4 @@ def _uncertainty(table: Table) -> Uncertainty:
         raise table.error(None, f"has no direction; expected at least one of {', '.join(ARRAYS)}")
     bounds = table.array("bounds") if "bounds" in table else np.array([-1.0, 1.0])
     with table.errors():
-        return Uncertainty(**arrays, bounds=tuple(bounds), name=table.text("name", ""))
+        return Uncertainty(**arrays, bounds=tuple(bounds.tolist()), name=table.text("name", ""))

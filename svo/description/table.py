@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 _KINDS = {str: "text in quotes", bool: "true or false", int: "a whole number", dict: "a table", list: "a list"}
 
 
+class DescriptionError(ValueError):
+    """A mistake whose message names file, table and key."""
+
+
 @dataclass(frozen=True)
 class Table:
     """One table, with its file and its name in it ("" at the top).
@@ -49,13 +53,15 @@ class Table:
             place.append(f"[{self.name}]")
         if key is not None:
             place.append(f"key {key!r}")
-        return ValueError(f"{', '.join(place)}: {message}")
+        return DescriptionError(f"{', '.join(place)}: {message}")
 
     @contextmanager
     def errors(self) -> Iterator[None]:
         """Give errors of what is made from this table its place."""
         try:
             yield
+        except DescriptionError:
+            raise
         except (ValueError, TypeError) as error:
             raise self.error(None, str(error)) from error
 

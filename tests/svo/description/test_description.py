@@ -9,9 +9,11 @@ from scipy.io import savemat
 
 from svo.description import find_plant, keep_description, read_description
 from svo.detect import detect
+from svo.discretisation import remainder_bound
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.log import Log
 from svo.observers.window import WindowObserver
+from svo.uncertainty import Uncertainty
 
 CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
 STUCK = """
@@ -170,7 +172,13 @@ ERRORS: list[tuple[tuple[str, str], list[str]]] = [
     (('outputs = [{ name = "position", unit = "m" }]', ""), ["[columns], key 'outputs': is missing"]),
     (('name = "force"', 'name = "position"'), ["[columns]", "'position' more than once"]),
     (("[{ name = \"force\", unit = \"N\" }]", '["force"]'), ["[columns], key 'inputs'", "expected a list of tables"]),
-    (('name = "force"', 'name = "a", unit = "N" }, { name = "b"'), ["[model]", "names['inputs'] has 2 entries"]),
+    (('name = "force"', 'name = "a", unit = "N" }, { name = "b"'), ["[columns], key 'inputs': names 2 columns"]),
+    (("n = [0.05]", "n = [0.05]\ncontinuous = true"), ["[model]: remainder is missing", "{states = [...], inputs"]),
+    (
+        ("n = [0.05]", "n = [0.05]\ncontinuous = true\nremainder = { states = [1.0], inputs = [2.0] }"),
+        ["[model.remainder]: x is", "shape (2,)"],
+    ),
+    (("n = [0.05]", "continuous = true\nremainder = { inputs = [2.0] }"), ["[model.remainder], key 'states'"]),
 ]  # fmt: skip
 
 
@@ -181,6 +189,23 @@ def test_a_mistake_is_one_error_with_its_place(tmp_path: Path, change: tuple[str
         read_description(path)
     for words in ["cart.toml", *expected]:
         assert words in str(caught.value), str(caught.value)
+    assert str(caught.value).count("cart.toml") == 1
+
+
+def test_the_remainder_may_be_computed_from_bounds_of_states_and_inputs(tmp_path: Path) -> None:
+    text = CART.read_text().replace("B = [[0.0], [0.01]]", "A = [[0.0, 0.0], [0.0, 0.1]]")
+    path = tmp_path / "cart.toml"
+    path.write_text(
+        text.replace("n = [0.05]", "n = [0.05]\ncontinuous = true\nremainder = { states = [9.0, 2.0], inputs = [3.0] }")
+    )
+    model = read_description(path).model
+    expected = remainder_bound(
+        [[1.0, 0.1], [0.0, 1.0]], [[0.0], [0.1]], E=[[0.0], [0.1]], w=[0.2], Ts=0.1, x=[9.0, 2.0], u=[3.0],
+        uncertainties=[Uncertainty(A=[[0.0, 0.0], [0.0, 0.1]])],
+    )  # fmt: skip
+    assert np.array_equal(model.bounds()[1][1:], expected)
+    assert expected[1] > 0
+    assert model.names is not None
 
 
 def test_other_noise_sets_are_refused() -> None:
