@@ -101,6 +101,8 @@ def remainder_bound(
     """
     A = _square(A)
     n = len(A)
+    if not (np.isfinite(Ts) and Ts > 0):
+        raise ValueError(f"Ts is {Ts}; expected a positive sampling time in seconds")
     reach = {"A": _largest("x", x, n)}
     reach["B"] = _largest("u", u, 0 if B is None else np.shape(B)[-1])
     reach["E"] = np.maximum(*(np.abs(edge) for edge in _bounds(w, 0 if E is None else np.shape(E)[-1])))

@@ -29,7 +29,12 @@ def plants(as_json: AsJson = False) -> None:
     with one_line_errors():
         from svo.plant import load_plant, registered_plants
 
-        every = [load_plant(name) for name in registered_plants()]
+        every = []
+        for name in registered_plants():
+            try:
+                every.append(load_plant(name))
+            except (ImportError, TypeError) as error:  # one that is broken hides no other
+                typer.echo(f"note: {error}", err=True)
         if as_json:
             print_json([describe(plant) for plant in every])
             return

@@ -123,8 +123,10 @@ class StudyFolder:
         Raises
         ------
         ValueError
-            If the folder's ``study.json`` is not that of a study.
+            If the folder has no ``study.json``, or not that of a study.
         """
+        if not self._identity.exists():
+            raise ValueError(f"{self.path} holds no study (study.json is missing); expected a folder of svo study")
         stored = json.loads(self._identity.read_text(encoding="utf-8"))
         if not (isinstance(stored, dict) and isinstance(stored.get("configuration"), dict)):
             raise ValueError(f"{self._identity} is not that of a study; expected an object with a configuration")

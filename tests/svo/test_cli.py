@@ -404,6 +404,6 @@ def test_a_report_is_written_from_the_runs_so_far(registered_tank: str, tmp_path
     for part in (out / "runs.parquet").iterdir():
         part.unlink()
     assert "holds no finished run yet" in one_line(svo("report", out))
-    assert "study.json" in one_line(svo("report", tmp_path / "nowhere"))
+    assert "nowhere holds no study (study.json is missing)" in one_line(svo("report", tmp_path / "nowhere"))
     (out / "study.json").write_text("{}", encoding="utf-8")
     assert "study.json is not that of a study" in one_line(svo("report", out))

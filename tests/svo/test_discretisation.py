@@ -63,6 +63,7 @@ def test_the_computed_remainder_is_attained_to_first_order() -> None:
     ("changes", "message"),
     [
         ({"A": np.ones((1, 2))}, r"A has shape \(1, 2\); expected a square"),
+        ({"Ts": -0.1}, "Ts is -0.1; expected a positive sampling time"),
         ({"x": [1.0, 2.0]}, r"x is .*; expected the largest absolute values, shape \(1,\)"),
         ({"u": [-1.0]}, "u is .*; expected the largest absolute values"),
         ({"u": None}, r"u is \[\]; expected the largest absolute values, shape \(1,\)"),

@@ -6,8 +6,10 @@ from importlib.metadata import EntryPoint
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 import svo.plant
+from svo.cli import app
 from svo.plant import Plant, load_plant, registered_plants
 
 
@@ -23,8 +25,20 @@ def test_a_registered_plant_is_listed_and_loaded(registered_tank: str) -> None:
 def test_listing_does_not_import_a_plant(monkeypatch: pytest.MonkeyPatch) -> None:
     register(monkeypatch, "broken", "no.such.module:plant")
     assert list(registered_plants()) == ["broken"]
-    with pytest.raises(ModuleNotFoundError, match="no"):
+    with pytest.raises(ImportError, match=r"plant 'broken' of group svo.plants cannot be loaded: No module named 'no'"):
         load_plant("broken")
+    register(monkeypatch, "nameless", "math:plant")
+    with pytest.raises(ImportError, match=r"plant 'nameless' .* cannot be loaded: .*no attribute 'plant'"):
+        load_plant("nameless")
+
+
+def test_a_broken_plant_hides_no_other(monkeypatch: pytest.MonkeyPatch, registered_tank: str) -> None:
+    points = [*svo.plant.entry_points(group="svo.plants"), EntryPoint("broken", "no.such.module:plant", "svo.plants")]
+    monkeypatch.setattr(svo.plant, "entry_points", lambda group: points)
+    result = CliRunner().invoke(app, ["plants"])
+    assert result.exit_code == 0
+    assert "tank: Water tank" in result.stdout
+    assert "note: plant 'broken' of group svo.plants cannot be loaded" in result.stderr
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones(monkeypatch: pytest.MonkeyPatch, registered_tank: str) -> None:
@@ -40,7 +54,7 @@ def test_what_is_no_plant_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(TypeError, match=r"entry point 'dictionary' of group svo\.plants gave dict"):
         load_plant("dictionary")
     register(monkeypatch, "number", "math:pi")
-    with pytest.raises(TypeError, match="gave float"):
+    with pytest.raises(TypeError, match=r"gave float, which is not a Plant: it lacks name, title, Ts, .*scheduler"):
         load_plant("number")
 
 
