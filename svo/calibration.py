@@ -168,6 +168,8 @@ def _first_needed(piece: ElasticProgram, bound: int, before: Array, after: Array
 
 
 def _check_log(model: UncertainModel, log: Log) -> None:
+    if not isinstance(log, Log):
+        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log")
     if len(log) == 0:
         raise ValueError("log has no samples; expected at least one")
     for name, count in (("u", model.n_inputs), ("y", model.n_outputs)):

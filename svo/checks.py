@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,11 @@ def finite_array(name: str, value: Any) -> Array:
         raise ValueError(f"{name} has shape {array.shape} and contains NaN or Inf; expected finite numbers")
     array.setflags(write=False)
     return array
+
+
+def is_finite_number(value: Any) -> TypeGuard[float]:
+    """Whether a value is one real number, neither NaN nor infinite."""
+    return isinstance(value, int | float | np.number) and not isinstance(value, complex) and bool(np.isfinite(value))
 
 
 def check_disturbance_box(lower: Array, upper: Array, nw: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from svo.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
+from svo.log_columns import check_times, columns_of_log
 from svo.plant import MonitoredPlant, Scheduler, architecture_of, schedule_of
 
 
@@ -94,6 +95,16 @@ def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterat
             yield bank.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=schedule)
 
 
+def check_log(plant: MonitoredPlant, log: Log) -> None:
+    """Raise an error if a log is not one of a plant: its channels, and its sampling time within 1 %."""
+    if not isinstance(log, Log):
+        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.log_file.read_log gives")
+    if len(log) == 0:
+        raise ValueError("log has no samples; expected at least one")
+    columns_of_log(replace(log, x=None), plant.columns)
+    check_times(log.time, plant.Ts, lambda k: f"log, sample {k}")
+
+
 def detect(
     plant: MonitoredPlant,
     log: Log,
@@ -115,7 +126,15 @@ def detect(
         Where the log comes from; stored in each alarm beside plant and noise set.
     progress : callable, optional
         Called with (samples done, samples in all) after each sample.
+
+    Raises
+    ------
+    TypeError
+        If the log is no `svo.Log`.
+    ValueError
+        For an unknown noise set, and for a log without samples, with other channels, or of another sampling time.
     """
+    check_log(plant, log)
     bank = plant.bank(noise)
     bank.warm_up()  # no sample waits for a compiler
     recorder = Recorder(bank.names, len(log))
@@ -140,11 +159,12 @@ def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:
     return {"plant": plant.name} | ({} if architecture is None else {"architecture": architecture})
 
 
-def write_detection(folder: Path, detection: Detection, beside: Mapping[str, Any] | None = None) -> None:
+def write_detection(folder: str | Path, detection: Detection, beside: Mapping[str, Any] | None = None) -> None:
     """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be.
 
     ``beside`` is added to verdict.json: what detectors without certificates say, by name.
     """
+    folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     write_alarms(folder / "alarms.jsonl", detection.alarms)
     verdict = {**detection.to_dict(), **(beside or {})}

@@ -48,9 +48,12 @@ class Log:
         object.__setattr__(self, "time", time)
         for name in ("u", "y", "x", "schedule"):
             value = getattr(self, name)
-            if value is None:
+            if value is None and name in ("x", "schedule"):
                 continue
-            array = np.asarray(value, dtype=float)
+            array = np.asarray(value)
+            if array.dtype.kind not in "biuf":
+                raise ValueError(f"{name} is of the type {array.dtype}; expected real numbers, NaN for a missing one")
+            array = array.astype(float, copy=False)
             if array.shape[:1] != time.shape or (name != "schedule" and array.ndim != 2):
                 raise ValueError(
                     f"{name} has shape {array.shape}; expected ({time.size}, channels), one row a sample of time"

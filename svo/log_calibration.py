@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.calibration import Calibration, calibrate
+from svo.detect import check_log
 from svo.log import Log
 from svo.plant import MonitoredPlant, schedule_of
 
@@ -58,7 +59,11 @@ class LogCalibration:
 
 
 def calibrate_log(plant: MonitoredPlant, log: Log, noise: str) -> LogCalibration:
-    """Calibrate the model of a bank's nominal observer; the plant's own scheduler makes the schedule from y."""
+    """Calibrate the model of a bank's nominal observer; the plant's own scheduler makes the schedule from y.
+
+    Raises as `svo.detect.detect` and `svo.calibration.calibrate` do.
+    """
+    check_log(plant, log)
     nominal, scheduler = plant.bank(noise).observers["nominal"], plant.scheduler()
     values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
     schedule = None if values[0] is None else np.array(values, dtype=float)

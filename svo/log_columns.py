@@ -98,10 +98,15 @@ def assemble(source: str, cells: Mapping[str, Array], columns: Columns, Ts: floa
     time = cells[columns.time]
     if not len(time):
         raise ValueError(f"{source} has a header but no samples; expected one row a sample")
-    for k in np.flatnonzero(~_is_sampled(np.diff(time), Ts))[:1]:
-        raise wrong_step(f"{source}, {place(int(k) + 1)}, column {columns.time!r}", time[k], time[k + 1], Ts)
+    check_times(time, Ts, lambda k: f"{source}, {place(k)}, column {columns.time!r}")
     y, u, x = (_stack(cells, group, len(time)) for group in (columns.outputs, columns.inputs, columns.states))
     return Log(time=time, u=u, y=y, x=x if columns.states and columns.states[0].name in cells else None)
+
+
+def check_times(time: Array, Ts: float, place: Place) -> None:
+    """Raise a ValueError unless time goes by the sampling time; ``place`` says where a sample stands."""
+    for k in np.flatnonzero(~_is_sampled(np.diff(time), Ts))[:1]:
+        raise wrong_step(place(int(k) + 1), time[k], time[k + 1], Ts)
 
 
 def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError:

@@ -271,7 +271,7 @@ class UncertainModel:
         TypeError
             If rng is no Generator.
         ValueError
-            For a wrong shape, or a schedule that is missing.
+            For a wrong shape, NaN or Inf, or a schedule that is missing.
         """
         return simulate(self, x0, u, rng, corners=corners, schedule=schedule)
 

@@ -32,6 +32,9 @@ def simulate(
         raise TypeError(f"rng is {rng!r}; expected a numpy Generator, such as np.random.default_rng(0)")
     if x.shape != (model.n_states,):
         raise ValueError(f"x0 has shape {x.shape}; expected ({model.n_states},)")
+    for name, array in (("u", inputs), ("x0", x)):
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} contains NaN or Inf; expected finite numbers")
     values = None if schedule is None else np.asarray(schedule, dtype=float)
     if values is None and model.is_scheduled:
         raise ValueError("schedule is missing: the model has arrays that are functions of it; give one value a sample")

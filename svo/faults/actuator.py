@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import is_finite_number
 from svo.faults.blocks import (
     channels,
     check_channels,
@@ -18,7 +19,7 @@ from svo.faults.blocks import (
     with_new_disturbances,
     without_columns,
 )
-from svo.faults.profiles import EDGE_TOLERANCE_S, Profile, Step
+from svo.faults.profiles import EDGE_TOLERANCE_S, Profile, Step, at_times, check_profile
 from svo.model import UncertainModel, Uncertainty
 
 Array = NDArray[np.float64]
@@ -107,6 +108,7 @@ class ActuatorFault:
 
     def __post_init__(self) -> None:
         channels(self.where)
+        check_profile(self.profile)
         if self.kind not in get_args(ActuatorKind):
             raise ValueError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(ActuatorKind))}")
         self._check_magnitude()
@@ -172,7 +174,7 @@ class ActuatorFault:
         -------
         array of the shape of u
         """
-        commands = np.array(u, dtype=float)
+        commands = at_times("u", t, u)
         where = channels(self.where)
         check_channels(where, commands.shape[-1], "channels in u")
         law = self.law(t)
@@ -296,7 +298,7 @@ class ActuatorFault:
             if self.magnitude is not None:
                 raise ValueError(f"magnitude is {self.magnitude} but {self.kind} has none; give None")
             return
-        if self.magnitude is None or not np.isfinite(self.magnitude):
+        if not is_finite_number(self.magnitude):
             raise ValueError(f"magnitude is {self.magnitude}; {self.kind} needs a finite number")
         if self.kind == "loss" and not 0 < self.magnitude <= 1:
             raise ValueError(f"magnitude is {self.magnitude}; expected the lost fraction, 0 < magnitude <= 1")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.faults.profiles import Profile
+from svo.checks import is_finite_number
+from svo.faults.profiles import Profile, check_profile
 from svo.model import UncertainModel, Uncertainty
 
 Array = NDArray[np.float64]
@@ -40,7 +41,8 @@ class PlantFault:
     def __post_init__(self) -> None:
         if not isinstance(self.direction, Uncertainty):
             raise TypeError(f"direction is a {type(self.direction).__name__}; expected an Uncertainty")
-        if not np.isfinite(self.magnitude) or self.magnitude == 0:
+        check_profile(self.profile)
+        if not is_finite_number(self.magnitude) or self.magnitude == 0:
             raise ValueError(f"magnitude is {self.magnitude}; expected a finite number, not zero")
 
     def delta(self, t: ArrayLike) -> Array:

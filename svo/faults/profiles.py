@@ -8,7 +8,7 @@ from the written 0.57 in the last digit, and the first faulty sample must not de
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,6 +105,21 @@ def _elapsed(t: ArrayLike, start: float) -> Array:
 
 def _started(elapsed: Array) -> NDArray[np.bool_]:
     return np.asarray(elapsed >= -EDGE_TOLERANCE_S)
+
+
+def at_times(name: str, t: ArrayLike, values: ArrayLike) -> Array:
+    """A copy of a vector a time: (channels,) at one time, (K, channels) at K times."""
+    array, times = np.array(values, dtype=float), np.shape(t)
+    if array.ndim != len(times) + 1 or array.shape[:-1] != times:
+        expected = "(channels,)" if not times else f"({', '.join(map(str, times))}, channels)"
+        raise ValueError(f"{name} has shape {array.shape}; expected {expected} for t of shape {times}")
+    return array
+
+
+def check_profile(profile: Any) -> None:
+    """Refuse what has no ``start`` and ``value``."""
+    if not isinstance(profile, Profile):
+        raise TypeError(f"profile is a {type(profile).__name__}; expected a Profile, such as Step(1.0)")
 
 
 def _check_finite(name: str, value: float) -> None:

@@ -8,8 +8,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import is_finite_number
 from svo.faults.blocks import channels, check_channels, mapped, only_rows, product_of, with_noise
-from svo.faults.profiles import Profile
+from svo.faults.profiles import Profile, at_times, check_profile
 from svo.model import Schedulable, UncertainModel, Uncertainty
 
 Array = NDArray[np.float64]
@@ -58,6 +59,8 @@ class SensorFault:
     ------
     ValueError
         For a bad ``where``, an unknown kind, a magnitude that is not finite, or zero where that is no fault.
+    TypeError
+        If the profile is none.
     """
 
     where: int | tuple[int, ...]
@@ -69,7 +72,8 @@ class SensorFault:
         channels(self.where)
         if self.kind not in get_args(SensorKind):
             raise ValueError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(SensorKind))}")
-        if not np.isfinite(self.magnitude) or (self.magnitude == 0 and self.kind != "hard"):
+        check_profile(self.profile)
+        if not is_finite_number(self.magnitude) or (self.magnitude == 0 and self.kind != "hard"):
             raise ValueError(f"magnitude of the {self.kind} is {self.magnitude}; expected a finite number, not zero")
 
     def delta(self, t: ArrayLike) -> Array:
@@ -100,7 +104,7 @@ class SensorFault:
         -------
         array of the shape of y
         """
-        readings = np.array(y, dtype=float)
+        readings = at_times("y", t, y)
         where = channels(self.where)
         check_channels(where, readings.shape[-1], "channels in y")
         law = self.law(t)

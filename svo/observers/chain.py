@@ -84,13 +84,15 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
     Raises
     ------
     TypeError
-        If the observer is no `WindowObserver`: the sets of the others are not proven.
+        If the observer is no `WindowObserver`: the sets of the others are not proven. If the log is no `svo.Log`.
     ValueError
         If a late measurement arrived after the log's end, or before it was taken; and as `WindowObserver.step` and
         `WindowObserver.late_update` do.
     """
     if not isinstance(observer, WindowObserver):
         raise TypeError(f"observer is a {type(observer).__name__}; expected a WindowObserver, the only kind proven")
+    if not isinstance(log, Log):
+        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log")
     begun = perf_counter()
     waiting = list(late)
     for i, measurement in enumerate(waiting):
