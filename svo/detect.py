@@ -97,6 +97,10 @@ def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterat
 
 def check_log(plant: MonitoredPlant, log: Log) -> None:
     """Raise an error if a log is not one of a plant: its channels, and its sampling time within 1 %."""
+    if isinstance(plant, str | Path):
+        raise TypeError(
+            f"plant is {str(plant)!r}; expected a plant, such as svo.description.find_plant({str(plant)!r}) gives"
+        )
     if not isinstance(log, Log):
         raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.log_file.read_log gives")
     if len(log) == 0:
@@ -130,7 +134,7 @@ def detect(
     Raises
     ------
     TypeError
-        If the log is no `svo.Log`.
+        If the plant is a name, or the log no `svo.Log`.
     ValueError
         For an unknown noise set, and for a log without samples, with other channels, or of another sampling time.
     """

@@ -112,6 +112,14 @@ def test_a_frame_is_no_log() -> None:
             run()
 
 
+def test_a_name_is_no_plant_and_a_text_no_sampling_time() -> None:
+    with pytest.raises(TypeError, match=r"plant is 'cart.toml'; expected .* svo.description.find_plant\('cart.toml'\)"):
+        detect("cart.toml", LOG, "stated")  # type: ignore[arg-type]
+    for wrong in ("10 ms", 0.0, float("nan")):
+        with pytest.raises(ValueError, match=r"Ts is .*; expected a positive sampling time in seconds"):
+            read_log(EXAMPLES / "cart.csv", CART.columns, wrong)  # type: ignore[arg-type]
+
+
 def test_findings_go_to_a_folder_named_by_text(tmp_path: Path) -> None:
     write_detection(str(tmp_path / "found"), detect(CART, LOG, "stated"))
     assert (tmp_path / "found" / "alarms.jsonl").exists()
