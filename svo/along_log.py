@@ -19,13 +19,15 @@ Array = NDArray[np.float64]
 _TYPICAL = -1.0  # the sample before the first stands for the typical schedule, at which observers choose their rows
 
 
-def along(model: UncertainModel, schedule: ArrayLike) -> UncertainModel:
+def along(model: UncertainModel, schedule: ArrayLike | None) -> UncertainModel:
     """See `UncertainModel.along`."""
+    if not model.is_scheduled:
+        return model
+    if schedule is None:
+        raise ValueError("schedule is missing: the model has arrays or bounds that are functions of it")
     values: Array = np.asarray(schedule, dtype=np.float64)
     if values.ndim == 0 or len(values) == 0:
         raise ValueError(f"schedule has shape {values.shape}; expected (K, ...), one value a sample")
-    if not model.is_scheduled:
-        return model
     typical: Array = np.asarray(model.schedule, dtype=np.float64)
     if typical.shape != values.shape[1:]:
         raise ValueError(f"schedule has shape {values.shape[1:]} at a sample; expected {typical.shape}")

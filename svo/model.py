@@ -168,7 +168,7 @@ class UncertainModel:
         """`bounds` at many samples (K, nw), (K, nw), (K, ny); functions are asked as `stack_over` asks them."""
         return self._bounds.over(schedule)
 
-    def along(self, schedule: ArrayLike) -> UncertainModel:
+    def along(self, schedule: ArrayLike | None) -> UncertainModel:
         """The same model along one log, the schedule of sample k being the number k.
 
         Every function of the schedule is evaluated once for all samples and tabulated, which saves their evaluation
@@ -176,13 +176,13 @@ class UncertainModel:
 
         Parameters
         ----------
-        schedule : (K, ...) array
-            One value a sample, K >= 1.
+        schedule : (K, ...) array, or None
+            One value a sample, K >= 1. None will do for a model without schedule.
 
         Raises
         ------
         ValueError
-            For a schedule of another shape than the typical one, or an array or bound that is not finite.
+            For a schedule that is missing or not shaped like the typical one, or an array or bound that is not finite.
         """
         return along(self, schedule)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,22 +21,6 @@ Array = NDArray[np.float64]
 NOMINAL = "nominal"
 LARGEST_SCALE = 16.0
 PRECISION = 0.02  # relative, of a critical scale
-
-
-class PreparedLog:
-    """A log, its schedule being the numbers of its samples, and the models along it (see `UncertainModel.along`)."""
-
-    def __init__(self, log: Log, models: Mapping[str, UncertainModel]) -> None:
-        self._models, self._schedule = models, log.schedule
-        self._along: dict[str, UncertainModel] = {}
-        self.log = log if log.schedule is None else replace(log, schedule=np.arange(float(len(log))))
-
-    def model(self, name: str) -> UncertainModel:
-        """Evaluated when it is first asked for: a run that only detects needs but one."""
-        if name not in self._along:
-            model = self._models[name]
-            self._along[name] = model if self._schedule is None else model.along(self._schedule)
-        return self._along[name]
 
 
 @dataclass(frozen=True)
@@ -85,13 +69,13 @@ class WindowBank:
     def fixed(self) -> Setting | None:
         return Setting(1.0) if self.stated else None
 
-    def prepare(self, log: Log) -> PreparedLog:
-        return PreparedLog(log, self.models)
+    def prepare(self, log: Log) -> Log:
+        return log
 
     def learn(self, parameters: Mapping[str, float], healthy: Sequence[Any]) -> Mapping[str, Array]:
         return {}
 
-    def critical_level(self, setting: Setting, prepared: PreparedLog, floor: float) -> float:
+    def critical_level(self, setting: Setting, prepared: Log, floor: float) -> float:
         """By bisection on a logarithmic scale; infinite if even the largest scale does not explain the log."""
         low = max(floor, 1.0 / LARGEST_SCALE)
         if not self._falsified(prepared, low):
@@ -106,7 +90,7 @@ class WindowBank:
             low, high = (middle, high) if self._falsified(prepared, middle) else (low, middle)
         return high
 
-    def run(self, setting: Setting, prepared: PreparedLog, isolate: bool = True) -> Detection:
+    def run(self, setting: Setting, prepared: Log, isolate: bool = True) -> Detection:
         """The whole bank if it is to isolate, the nominal observer alone if not."""
         if isolate and self.faults:
             return self._run_bank(setting.level, prepared)
@@ -114,17 +98,19 @@ class WindowBank:
 
     # -- inside ------------------------------------------------------------------------------------
 
-    def _observer(self, model: UncertainModel, scale: float) -> WindowObserver:
-        return WindowObserver(scaled_bounds(model, scale), self.initial, horizon=self.horizon)
+    def _observer(self, name: str, scale: float, log: Log) -> WindowObserver:
+        """Its model is evaluated for the whole log at once; the schedule of a sample is its number."""
+        model = scaled_bounds(self.models[name].along(log.schedule), scale)
+        return WindowObserver(model, self.initial, horizon=self.horizon)
 
-    def _falsified(self, prepared: PreparedLog, scale: float) -> bool:
-        observer = self._observer(prepared.model(NOMINAL), scale)
-        return any(step.verdict == "falsified" for step in _drive(observer, prepared.log))
+    def _falsified(self, log: Log, scale: float) -> bool:
+        steps = _drive(self._observer(NOMINAL, scale, log), log)
+        return any(step.verdict == "falsified" for step in steps)
 
-    def _run_nominal(self, scale: float, prepared: PreparedLog) -> Detection:
-        samples, processed = len(prepared.log), 0
-        alarm, width = np.zeros(samples, dtype=bool), self._empty_width(samples)
-        for k, step in enumerate(_drive(self._observer(prepared.model(NOMINAL), scale), prepared.log)):
+    def _run_nominal(self, scale: float, log: Log) -> Detection:
+        alarm, width = np.zeros(len(log), dtype=bool), self._empty_width(len(log))
+        processed = 0
+        for k, step in enumerate(_drive(self._observer(NOMINAL, scale, log), log)):
             processed = k + 1
             if step.verdict == "falsified":
                 alarm[k:] = True
@@ -132,13 +118,12 @@ class WindowBank:
             self._measure(width, k, step)
         return Detection(alarm, None, processed, width)
 
-    def _run_bank(self, scale: float, prepared: PreparedLog) -> Detection:
-        observers = {name: self._observer(prepared.model(name), scale) for name in self.models}
-        bank = ArchitectureI(observers.pop(NOMINAL), observers)
-        samples, processed = len(prepared.log), 0
-        alarm, isolated = np.zeros(samples, dtype=bool), np.full(samples, NOBODY, dtype=np.intp)
-        width = self._empty_width(samples)
-        for k, verdict in enumerate(_drive(bank, prepared.log)):
+    def _run_bank(self, scale: float, log: Log) -> Detection:
+        faults = {name: self._observer(name, scale, log) for name in self.faults}
+        bank = ArchitectureI(self._observer(NOMINAL, scale, log), faults)
+        alarm, isolated = np.zeros(len(log), dtype=bool), np.full(len(log), NOBODY, dtype=np.intp)
+        width, processed = self._empty_width(len(log)), 0
+        for k, verdict in enumerate(_drive(bank, log)):
             processed = k + 1
             if verdict.state != NOMINAL:
                 alarm[k:] = True
@@ -160,7 +145,7 @@ class WindowBank:
 
 
 def _drive(observer: Any, log: Log) -> Any:
-    """Steps of an observer, or verdicts of a bank, over a log, one at a time."""
-    yield observer.update(log.y[0], u=log.u[0], schedule=log.schedule_at(0))
+    """Steps of an observer, or verdicts of a bank, over a log, one at a time; their models are those along the log."""
+    yield observer.update(log.y[0], u=log.u[0], schedule=0.0)
     for k in range(1, len(log)):
-        yield observer.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=log.schedule_at(k))
+        yield observer.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=float(k))

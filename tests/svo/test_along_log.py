@@ -97,12 +97,15 @@ def test_an_observer_says_the_same(seed: int) -> None:
 def test_a_model_without_schedule_stays_as_it_is() -> None:
     model = UncertainModel([[0.5]], None, [[1.0]], n=[0.1])
     assert model.along(np.zeros(3)) is model
+    assert model.along(None) is model
 
 
 def test_mistakes_are_named() -> None:
     model = first_order_model(0.1, 0.01)
     with pytest.raises(ValueError, match=r"schedule has shape \(3,\) at a sample; expected \(4,\)"):
         model.along(np.zeros((5, 3)))
+    with pytest.raises(ValueError, match="schedule is missing"):
+        model.along(None)
     with pytest.raises(ValueError, match=r"expected \(K, ...\), one value a sample"):
         model.along(np.zeros((0, 4)))
     wrong = np.tile([0.5, 0.1, 1.0, 0.2], (5, 1))

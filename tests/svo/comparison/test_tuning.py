@@ -69,7 +69,7 @@ def test_critical_scale_is_where_the_alarm_ends():
     plant = SmallPlant()
     bank = WindowBank({"nominal": model()}, BOX, 5)
     for fault, seed in (("none", 0), ("first", 1)):
-        log = bank.prepare(plant.simulate(fault, "step", "usual", seed))
+        log = plant.simulate(fault, "step", "usual", seed)
         critical = bank.critical_level(Setting(1.0), log, 0.0)
         assert not bank.run(Setting(critical), log).alarm.any()
         assert bank.run(Setting(critical / 1.03), log).alarm.any()
@@ -80,21 +80,20 @@ def test_critical_scale_is_where_the_alarm_ends():
 def test_bank_stops_only_when_nothing_can_change():
     plant = SmallPlant()
     bank = plant.detectors("usual")[0]
-    prepared = bank.prepare(plant.simulate("first", "step", "usual", 0))
-    found = bank.run(Setting(1.0), prepared)
+    found = bank.run(Setting(1.0), plant.simulate("first", "step", "usual", 0))
     assert found.alarm[20:].all()
     assert not found.alarm[:20].any()
     assert found.isolated[-1] == bank.faults.index("first")
     assert found.processed < found.alarm.size
-    alone = bank.run(Setting(1.0), prepared, isolate=False)
+    alone = bank.run(Setting(1.0), plant.simulate("first", "step", "usual", 0), isolate=False)
     assert alone.isolated is None
     np.testing.assert_array_equal(alone.alarm, found.alarm)
 
 
 def test_widths_are_those_of_the_nominal_set():
     log = SmallPlant().simulate("none", "none", "usual", 0)
-    bank = WindowBank({"nominal": model()}, BOX, 5, width_of=[[1.0, 0.0]])
-    narrow, wide = (bank.run(Setting(scale), bank.prepare(log)).width for scale in (1.0, 2.0))
+    narrow = WindowBank({"nominal": model()}, BOX, 5, width_of=[[1.0, 0.0]]).run(Setting(1.0), log).width
+    wide = WindowBank({"nominal": model()}, BOX, 5, width_of=[[1.0, 0.0]]).run(Setting(2.0), log).width
     assert narrow.shape == (len(log), 1)
     assert (narrow > 0).all()
     assert (narrow <= 0.2 + 1e-6).all()  # the sensor alone
