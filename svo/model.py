@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import check_disturbance_box, check_noise, finite_array
+from svo.along_log import along
+from svo.checks import finite_array
 from svo.discretisation import discretise
 from svo.log import Log
+from svo.model_bounds import Bounds, bounds_of
 from svo.model_file import read_arrays
 from svo.simulation import simulate
 from svo.stack import OUTPUT_BLOCKS, STATE_BLOCKS, Layout, ScheduledBlock, Stack
@@ -79,8 +81,7 @@ class UncertainModel:
     schedule: Any = None
     layout: Layout = field(init=False, repr=False)
     _stack: Stack = field(init=False, repr=False)
-    _bounds: tuple[Any, Any, Any] = field(init=False, repr=False)
-    _bounds_scheduled: bool = field(init=False, repr=False)
+    _bounds: Bounds = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainties", tuple(self.uncertainties))
@@ -88,9 +89,8 @@ class UncertainModel:
             raise ValueError(f"Ts is {self.Ts}; expected a positive sampling time in seconds")
         object.__setattr__(self, "layout", self._measure())
         object.__setattr__(self, "_stack", self._stacked())
-        object.__setattr__(self, "_bounds", (*self._disturbance_bounds(), self._noise_bound()))
-        object.__setattr__(self, "_bounds_scheduled", any(callable(b) for b in self._bounds))
-        if self._bounds_scheduled and self.schedule is None:
+        object.__setattr__(self, "_bounds", bounds_of(self.w, self.n, self.layout.nw, self.layout.ny))
+        if self._bounds.scheduled and self.schedule is None:
             raise ValueError(
                 "schedule is missing: w or n is a function of it, so give a typical value to check shapes with"
             )
@@ -119,7 +119,7 @@ class UncertainModel:
     @property
     def is_scheduled(self) -> bool:
         """Whether any array or bound is a function of the schedule."""
-        return bool(self._stack.scheduled) or self._bounds_scheduled
+        return bool(self._stack.scheduled) or self._bounds.scheduled
 
     @property
     def uses_input_in_output(self) -> bool:
@@ -162,12 +162,29 @@ class UncertainModel:
 
     def bounds(self, schedule: Any = None) -> tuple[Array, Array, Array]:
         """Disturbance bounds (nw,), (nw,) and noise half-width (ny,) at one sample."""
-        if not self._bounds_scheduled:
-            return self._bounds
-        lower, upper, noise = (np.asarray(b(schedule), dtype=float) if callable(b) else b for b in self._bounds)
-        check_disturbance_box(lower, upper, self.layout.nw)
-        check_noise(noise, self.layout.ny)
-        return lower, upper, noise
+        return self._bounds.at(schedule)
+
+    def bounds_over(self, schedule: ArrayLike) -> tuple[Array, Array, Array]:
+        """`bounds` at many samples (K, nw), (K, nw), (K, ny); functions are asked as `stack_over` asks them."""
+        return self._bounds.over(schedule)
+
+    def along(self, schedule: ArrayLike | None) -> UncertainModel:
+        """The same model along one log, the schedule of sample k being the number k.
+
+        Every function of the schedule is evaluated once for all samples and tabulated, which saves their evaluation
+        where several observers, or many runs, go over one log. A model without schedule is returned as it is.
+
+        Parameters
+        ----------
+        schedule : (K, ...) array, or None
+            One value a sample, K >= 1. None will do for a model without schedule.
+
+        Raises
+        ------
+        ValueError
+            For a schedule that is missing or not shaped like the typical one, or an array or bound that is not finite.
+        """
+        return along(self, schedule)
 
     def block(self, name: str, schedule: Any = None, uncertainty: int | None = None) -> Array:
         """One matrix by its name ("A", "B", ...), of the model or of one of its uncertainties."""
@@ -320,42 +337,6 @@ class UncertainModel:
                 else:
                     constant[where] = array
         return Stack(self.layout, constant, tuple(scheduled))
-
-    def _disturbance_bounds(self) -> tuple[Any, Any]:
-        nw, w = self.layout.nw, self.w
-        if w is None:
-            if nw:
-                raise ValueError(
-                    f"w is missing: E or F has {nw} columns; give (lower, upper), a half-width ({nw},) or an HPolytope"
-                )
-            return np.zeros(0), np.zeros(0)
-        if isinstance(w, HPolytope):
-            if w.dim != nw:
-                raise ValueError(f"w is a polytope of dimension {w.dim}; expected {nw}, the number of columns of E")
-            if w.emptiness().status == "empty":
-                raise ValueError("w is an empty polytope; expected a bounded set with a point")
-            lower, upper = w.bounding_box()
-            check_disturbance_box(lower, upper, nw)
-            return lower, upper
-        if isinstance(w, tuple) and len(w) == 2:
-            lower, upper = (b if callable(b) else finite_array("w", b) for b in w)
-        else:
-            upper = finite_array("w", w)
-            lower = -upper
-        if not (callable(lower) or callable(upper)):
-            lower, upper = (np.broadcast_to(b, (nw,)).copy() if b.ndim == 0 else b for b in (lower, upper))
-            check_disturbance_box(lower, upper, nw)
-        return lower, upper
-
-    def _noise_bound(self) -> Any:
-        if self.n is None:
-            return np.zeros(self.layout.ny)
-        if callable(self.n):
-            return self.n
-        noise = finite_array("n", self.n)
-        noise = np.full(self.layout.ny, float(noise)) if noise.ndim == 0 else noise
-        check_noise(noise, self.layout.ny)
-        return noise
 
     def _check_names(self) -> None:
         sizes = {

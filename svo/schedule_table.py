@@ -15,6 +15,20 @@ from svo.checks import finite_array
 Array = NDArray[np.float64]
 
 
+def values_over(value: Any, schedule: Array) -> Array:
+    """An array, or a function of the schedule, at many samples (K, ...).
+
+    A function that has a method ``over`` itself, as `ScheduleTable` has, is asked for all samples at once; others are
+    called once a sample.
+    """
+    if not callable(value):
+        array = np.asarray(value, dtype=np.float64)
+        return np.broadcast_to(array, (len(schedule), *array.shape))
+    if hasattr(value, "over"):
+        return np.asarray(value.over(schedule), dtype=np.float64)
+    return np.array([value(float(at) if at.ndim == 0 else at) for at in schedule], dtype=np.float64)
+
+
 class ScheduleTable:
     """A function of a scalar schedule by linear interpolation; usable wherever a model takes a function.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.schedule_table import ScheduleTable
+from svo.schedule_table import ScheduleTable, values_over
 
 Array = NDArray[np.float64]
 
@@ -94,12 +94,8 @@ class Stack:
         if self.table is not None:
             return self.table.over(values)
         stacks = np.repeat(self.constant[None], len(values), axis=0)
-        if not all(hasattr(block.function, "over") for block in self.scheduled):
-            for k, value in enumerate(values):
-                stacks[k] = self.at(float(value) if value.ndim == 0 else value)
-            return stacks
         for block in self.scheduled:
-            array: Array = np.asarray(block.function.over(values), dtype=np.float64)  # type: ignore[attr-defined]
+            array = values_over(block.function, values)
             if array.shape != (len(values), *block.shape):
                 message = self.layout.shape_message(block.owner, block.name, array.shape[1:])
                 raise ValueError(f"{message} at each sample")

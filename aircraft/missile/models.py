@@ -28,7 +28,6 @@ from numpy.typing import ArrayLike, NDArray
 from aircraft.missile.airframe import INPUTS, Airframe
 from aircraft.missile.imu import SensorErrors
 from aircraft.missile.redundancy import ForceBalance
-from aircraft.missile.simulator import rotation
 from svo.model import UncertainModel
 
 Array = NDArray[np.float64]
@@ -137,27 +136,33 @@ class Embedding:
         W[:, 0, 1], W[:, 0, 2], W[:, 1, 2] = -r, q, -p
         W[:, 1, 0], W[:, 2, 0], W[:, 2, 1] = r, -q, p
         A = np.eye(3) - self.Ts * W + 0.5 * self.Ts**2 * W @ W
-        gravity = self.airframe.gravity * np.array([rotation(angles)[2] for angles in y[:, 12:15]])
-        return {"A": A, "h": h, "G": balance.G, "gravity": gravity}
+        phi, theta = y[:, 12], y[:, 13]  # the last row of equation (4), the inertial vertical in body axes
+        down = np.column_stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
+        return {"A": A, "h": h, "G": balance.G, "gravity": self.airframe.gravity * down}
 
     def blocks_over(self, schedule: ArrayLike) -> dict[str, Array]:
-        """The model's blocks A, B, a, D and c at many samples, (K, ...) each."""
+        """The model's blocks A, B, a, D and c at many samples, (K, ...) each, read-only.
+
+        Those of the last schedule are kept: the blocks of a model, and the observers of a bank, ask for the same.
+        """
+        values = np.atleast_2d(np.asarray(schedule, dtype=float))
+        key = values.tobytes()
+        remembered, blocks = self._last[0]
+        if key != remembered:
+            blocks = self._blocks(values)
+            self._last[0] = (key, blocks)  # one assignment: safe where observers run in threads
+        return blocks
+
+    def _blocks(self, schedule: Array) -> dict[str, Array]:
+        if schedule.shape[1:] != TYPICAL.shape or not np.isfinite(schedule).all():
+            raise ValueError(f"schedule is {schedule}; expected {TYPICAL.size} finite measurements a sample")
         parts = self.over(schedule)
-        D, c = np.zeros((len(parts["A"]), len(OUTPUTS), N_INPUTS)), np.zeros((len(parts["A"]), len(OUTPUTS)))
+        D, c = np.zeros((len(schedule), len(OUTPUTS), N_INPUTS)), np.zeros((len(schedule), len(OUTPUTS)))
         D[:, 3:, : len(INPUTS)], c[:, 3:] = parts["G"], parts["h"]
         a = self.Ts * (parts["h"] + parts["gravity"])
-        return {"A": parts["A"], "B": self.Ts * D[:, 3:], "a": a, "D": D, "c": c}
-
-    def at(self, schedule: Any) -> dict[str, Array]:
-        """The same at one sample; shared between the observers of a bank, which all ask for the same one."""
-        values = np.asarray(schedule, dtype=float)
-        remembered, blocks = self._last[0]
-        key = values.tobytes()
-        if key != remembered:
-            if values.shape != TYPICAL.shape or not np.isfinite(values).all():
-                raise ValueError(f"schedule is {values}; expected {TYPICAL.size} finite measurements")
-            blocks = {name: block[0] for name, block in self.blocks_over(values).items()}
-            self._last[0] = (key, blocks)  # one assignment: safe where observers run in threads
+        blocks = {"A": parts["A"], "B": self.Ts * D[:, 3:], "a": a, "D": D, "c": c}
+        for block in blocks.values():
+            block.setflags(write=False)
         return blocks
 
     def block(self, name: str) -> Block:
@@ -209,8 +214,8 @@ class Block:
     change: Callable[..., Array] = np.asarray
 
     def __call__(self, schedule: Any) -> Array:
-        blocks = self.embedding.at(schedule)
-        return self.change(*(blocks[name] for name in self.names))
+        blocks = self.embedding.blocks_over(schedule)
+        return self.change(*(blocks[name][0] for name in self.names))
 
     def over(self, schedule: ArrayLike) -> Array:
         """At many schedules (K, 12): (K, ...)."""

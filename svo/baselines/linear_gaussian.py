@@ -92,20 +92,16 @@ class GaussianModel:
         Raises
         ------
         ValueError
-            If the log has other channels than the model.
+            If the log has other channels than the model, or no schedule where the model needs one.
         """
         wanted = (self.model.n_inputs, self.model.n_outputs)
         if (log.u.shape[1], log.y.shape[1]) != wanted:
             raise ValueError(f"log has {log.u.shape[1]} inputs and {log.y.shape[1]} outputs; expected {wanted}")
-        each = [self.model.bounds(log.schedule_at(k)) for k in range(len(log))]
-        bounds = tuple(np.array(bound) for bound in zip(*each, strict=True))
-        return GaussianSamples(*self._over(log.u, self._stacks(log), bounds), log.y)
-
-    def _stacks(self, log: Log) -> Array:
-        if log.schedule is not None:
-            return self.model.stack_over(log.schedule)
-        stack = self.model.stack(None)
-        return np.broadcast_to(stack, (len(log), *stack.shape))
+        if log.schedule is None and self.model.is_scheduled:
+            raise ValueError("log has no schedule; the model has arrays or bounds that are functions of it")
+        schedule = np.zeros(len(log)) if log.schedule is None else log.schedule
+        stacks, bounds = self.model.stack_over(schedule), self.model.bounds_over(schedule)
+        return GaussianSamples(*self._over(log.u, stacks, bounds), log.y)
 
     def _over(self, u: Array, stacks: Array, bounds: tuple[Array, ...]) -> Sample:
         """All arrays of a `Sample` with K in front, from inputs (K, nu), stacks of the model and its bounds."""

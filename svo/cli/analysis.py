@@ -150,7 +150,7 @@ def compare(
         if healthy_runs is not None:
             comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
         announce(PREPARING)
-        with progress("Detectors") as update:
+        with progress("Parts") as update:
             compared = run_comparison(comparison, workers, update)
         rows = publish_comparison(out, compared, the_plant)
         if as_json:

@@ -5,21 +5,22 @@ from __future__ import annotations
 import functools
 import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from svo.comparison.detector import Detector, Kind
+from svo.comparison.detector import Detector, Kind, Setting
 from svo.comparison.run import ComparedRun, Condition, compare_run
 from svo.comparison.tuning import FaultyRun, Tuned, tune
-from svo.log import Log
 from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, load_plant
 
 Progress = Callable[[int, int], None]
 DISTRIBUTIONS: tuple[Distribution, ...] = ("bounded", "gaussian")
 _TRAINING, _JUDGING, _CALIBRATION = 0, 1, 2  # branches of the seed
+_RUNS_IN_PART = 20
 
 
 @dataclass(frozen=True)
@@ -68,10 +69,28 @@ class Comparison:
         if not 0 <= self.rate < 1:
             raise ValueError(f"rate is {self.rate}; expected a share of fault-free runs in [0, 1)")
 
+    def parts(self) -> Iterator[Part]:
+        """The judged runs, a few of one scenario at a time."""
+        scenarios = 1 + len(compared_plant(self.plant).compared_faults)
+        for distribution in self.distributions:
+            for scenario in range(scenarios):
+                seeds = self.seeds(_JUDGING, scenario, self.runs if scenario else self.healthy_runs)
+                for first in range(0, len(seeds), _RUNS_IN_PART):
+                    yield Part(distribution, scenario, tuple(seeds[first : first + _RUNS_IN_PART]))
+
     def seeds(self, branch: int, scenario: int, count: int) -> list[int]:
         """Seeds of the runs of one scenario (0 = without a fault), the same for every detector and distribution."""
         sequence = np.random.SeedSequence(self.seed, spawn_key=(branch, scenario))
         return [int(s) for s in sequence.generate_state(count, np.uint64)]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some judged runs of one scenario (0 = without a fault)."""
+
+    distribution: Distribution
+    scenario: int
+    seeds: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -82,6 +101,10 @@ class Compared:
     kinds: Mapping[str, Kind]
     tuned: dict[tuple[str, str], Tuned] = field(default_factory=dict)
     rows: list[ComparedRun] = field(default_factory=list)
+
+    def settings(self, distribution: Distribution) -> list[Setting]:
+        """Of all detectors, in their order."""
+        return [tuned.setting for (of, _), tuned in self.tuned.items() if of == distribution]
 
 
 def run_comparison(comparison: Comparison, workers: int = 1, progress: Progress | None = None) -> Compared:
@@ -100,17 +123,19 @@ def run_comparison(comparison: Comparison, workers: int = 1, progress: Progress 
     names = [detector.name for detector in detectors]
     if len(set(names)) < len(names):
         raise ValueError(f"detectors are named {', '.join(names)}; expected different names")
-    tasks = [(distribution, index) for distribution in comparison.distributions for index in range(len(names))]
-    outcome: dict[tuple[str, int], tuple[Tuned, list[ComparedRun]]] = {}
-    for task, result in _results(comparison, tasks, min(workers, len(tasks))):
-        outcome[task] = result
-        if progress is not None:
-            progress(len(outcome), len(tasks))
     compared = Compared(comparison, {detector.name: detector.kind for detector in detectors})
-    for distribution, index in tasks:  # in this order whatever the workers did first
-        tuned, rows = outcome[distribution, index]
-        compared.tuned[distribution, names[index]] = tuned
-        compared.rows.extend(rows)
+    tunings = [(distribution, index) for distribution in comparison.distributions for index in range(len(names))]
+    parts = list(comparison.parts())
+    counted = functools.partial(_counted, progress, len(tunings) + len(parts))
+    with _pool(min(workers, max(len(tunings), len(parts)))) as submit:
+        found = counted(0, _results(submit, tune_detector, [(comparison, *task) for task in tunings]))
+        for (distribution, index), tuned in zip(tunings, found, strict=True):
+            compared.tuned[distribution, names[index]] = tuned
+        tasks = [(comparison, part, compared.settings(part.distribution)) for part in parts]
+        for rows in counted(len(tunings), _results(submit, judge, tasks)):
+            compared.rows.extend(rows)
+    order = {key: place for place, key in enumerate(compared.tuned)}
+    compared.rows.sort(key=lambda row: order[row.distribution, row.detector])  # stable: scenarios and seeds keep theirs
     return compared
 
 
@@ -123,21 +148,27 @@ def compared_plant(name: str) -> ComparesDetectors:
     return plant
 
 
-def compare_detector(comparison: Comparison, distribution: Distribution, index: int) -> tuple[Tuned, list[ComparedRun]]:
-    """Tune and judge one detector under one distribution of the noise."""
+def tune_detector(comparison: Comparison, distribution: Distribution, index: int) -> Tuned:
+    """Tune one detector under one distribution of the noise."""
     offer = compared_plant(comparison.plant)
     plant, detector = offer.with_noise(distribution), offer.detectors(comparison.noise)[index]
-    scenarios = ((HEALTHY, HEALTHY), *offer.compared_faults)
-    tuned = _tune(comparison, plant, detector, scenarios)
-    counts = [comparison.healthy_runs] + [comparison.runs] * len(offer.compared_faults)
+    return _tune(comparison, plant, detector, ((HEALTHY, HEALTHY), *offer.compared_faults))
+
+
+def judge(comparison: Comparison, part: Part, settings: Sequence[Setting]) -> list[ComparedRun]:
+    """All detectors over some runs of one scenario: every run is simulated once."""
+    offer = compared_plant(comparison.plant)
+    plant, detectors = offer.with_noise(part.distribution), offer.detectors(comparison.noise)
+    fault, profile = ((HEALTHY, HEALTHY), *offer.compared_faults)[part.scenario]
+    condition = Condition(part.distribution, fault, profile, fault_start(plant, fault, profile))
     rows = []
-    _compile(detector, tuned, plant.simulate(*scenarios[1], comparison.noise, 0))
-    for scenario, ((fault, profile), count) in enumerate(zip(scenarios, counts, strict=True)):
-        condition = Condition(distribution, fault, profile, fault_start(plant, fault, profile))
-        for seed in comparison.seeds(_JUDGING, scenario, count):
-            log = plant.simulate(fault, profile, comparison.noise, seed)
-            rows.append(compare_run(detector, tuned.setting, log, condition, seed))
-    return tuned, rows
+    for place, seed in enumerate(part.seeds):
+        log = plant.simulate(fault, profile, comparison.noise, seed)
+        for detector, setting in zip(detectors, settings, strict=True):
+            if place == 0:
+                compare_run(detector, setting, log, condition, seed)  # untimed: no judged run pays for compilation
+            rows.append(compare_run(detector, setting, log, condition, seed))
+    return rows
 
 
 def _tune(comparison: Comparison, plant: Plant, detector: Detector, scenarios: Sequence[tuple[str, str]]) -> Tuned:
@@ -171,20 +202,32 @@ class _Prepared(Sequence[Any]):
         return self._detector.prepare(self._plant.simulate(HEALTHY, HEALTHY, self._noise, self._seeds[index]))
 
 
-def _compile(detector: Detector, tuned: Tuned, log: Log) -> None:
-    """Run once untimed, so that no judged run pays for compilation."""
-    detector.run(tuned.setting, detector.prepare(log))
+Submit = Callable[..., Callable[[], Any]]
 
 
-def _results(
-    comparison: Comparison, tasks: list[tuple[Distribution, int]], workers: int
-) -> Iterator[tuple[tuple[str, int], tuple[Tuned, list[ComparedRun]]]]:
+@contextmanager
+def _pool(workers: int) -> Iterator[Submit]:
+    """What starts a call, here or in one of so many processes, and gives a function that waits for its result."""
     if workers == 1:
-        for task in tasks:
-            yield task, compare_detector(comparison, *task)
+        yield functools.partial
         return
     # Spawned, not forked: a fork would copy the locks of threads that run in this process.
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {pool.submit(compare_detector, comparison, *task): task for task in tasks}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
+        try:
+            yield lambda *call: pool.submit(*call).result
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # do not go on with what nobody waits for
+            raise
+
+
+def _results(submit: Submit, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
+    """In the order of the tasks, whatever is done first."""
+    for result in [submit(function, *task) for task in tasks]:
+        yield result()
+
+
+def _counted(progress: Progress | None, total: int, done: int, results: Iterator[Any]) -> Iterator[Any]:
+    for count, result in enumerate(results, start=done + 1):
+        if progress is not None:
+            progress(count, total)
+        yield result

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from svo.faults.blocks import disturbance_edges, mapped, with_noise
 from svo.model import UncertainModel
-
-Array = NDArray[np.float64]
 
 
 def scaled_bounds(model: UncertainModel, scale: float) -> UncertainModel:
@@ -27,7 +24,7 @@ def scaled_bounds(model: UncertainModel, scale: float) -> UncertainModel:
         raise ValueError(f"scale is {scale}; expected a positive number, 1 for the bounds as stated")
     if scale == 1.0:
         return model
-    return model.replace(w=_disturbances(model, scale), n=_at_schedule(model, lambda low, high, noise: scale * noise))
+    return model.replace(w=_disturbances(model, scale), n=with_noise(model, lambda noise: scale * noise))
 
 
 def _disturbances(model: UncertainModel, scale: float) -> Any:
@@ -36,15 +33,7 @@ def _disturbances(model: UncertainModel, scale: float) -> Any:
     if (polytope := model.disturbance_polytope) is not None:
         lower, upper = polytope.bounding_box()
         return polytope.affine_map(scale * np.eye(polytope.dim), (1 - scale) / 2 * (lower + upper))
-    return (
-        _at_schedule(model, lambda low, high, noise: (low + high) / 2 - scale * (high - low) / 2),
-        _at_schedule(model, lambda low, high, noise: (low + high) / 2 + scale * (high - low) / 2),
+    edges = disturbance_edges(model)
+    return tuple(
+        mapped(lambda low, high, s=s: (low + high) / 2 + s * scale * (high - low) / 2, *edges) for s in (-1, 1)
     )
-
-
-def _at_schedule(model: UncertainModel, formula: Callable[[Array, Array, Array], Array]) -> Any:
-    """The formula of the bounds: an array, or a function of the schedule where a bound is one."""
-    edges = model.w if isinstance(model.w, tuple) else (model.w,)
-    if callable(model.n) or any(callable(edge) for edge in edges):
-        return lambda schedule: formula(*model.bounds(schedule))
-    return formula(*model.bounds())

@@ -98,17 +98,19 @@ class WindowBank:
 
     # -- inside ------------------------------------------------------------------------------------
 
-    def _observer(self, name: str, scale: float) -> WindowObserver:
-        return WindowObserver(scaled_bounds(self.models[name], scale), self.initial, horizon=self.horizon)
+    def _observer(self, name: str, scale: float, log: Log) -> WindowObserver:
+        """Its model is evaluated for the whole log at once; the schedule of a sample is its number."""
+        model = scaled_bounds(self.models[name].along(log.schedule), scale)
+        return WindowObserver(model, self.initial, horizon=self.horizon)
 
     def _falsified(self, log: Log, scale: float) -> bool:
-        observer = self._observer(NOMINAL, scale)
-        return any(step.verdict == "falsified" for step in _drive(observer, log))
+        steps = _drive(self._observer(NOMINAL, scale, log), log)
+        return any(step.verdict == "falsified" for step in steps)
 
     def _run_nominal(self, scale: float, log: Log) -> Detection:
         alarm, width = np.zeros(len(log), dtype=bool), self._empty_width(len(log))
         processed = 0
-        for k, step in enumerate(_drive(self._observer(NOMINAL, scale), log)):
+        for k, step in enumerate(_drive(self._observer(NOMINAL, scale, log), log)):
             processed = k + 1
             if step.verdict == "falsified":
                 alarm[k:] = True
@@ -117,8 +119,8 @@ class WindowBank:
         return Detection(alarm, None, processed, width)
 
     def _run_bank(self, scale: float, log: Log) -> Detection:
-        faults = {name: self._observer(name, scale) for name in self.faults}
-        bank = ArchitectureI(self._observer(NOMINAL, scale), faults)
+        faults = {name: self._observer(name, scale, log) for name in self.faults}
+        bank = ArchitectureI(self._observer(NOMINAL, scale, log), faults)
         alarm, isolated = np.zeros(len(log), dtype=bool), np.full(len(log), NOBODY, dtype=np.intp)
         width, processed = self._empty_width(len(log)), 0
         for k, verdict in enumerate(_drive(bank, log)):
@@ -139,11 +141,11 @@ class WindowBank:
     def _measure(self, width: Array | None, k: int, step: Any) -> None:
         if width is not None:
             directions = np.atleast_2d(np.asarray(self.width_of, dtype=float))
-            width[k] = step.support(directions) + step.support(-directions)
+            width[k] = step.support(np.concatenate([directions, -directions])).reshape(2, -1).sum(axis=0)
 
 
 def _drive(observer: Any, log: Log) -> Any:
-    """Steps of an observer, or verdicts of a bank, over a log, one at a time."""
-    yield observer.update(log.y[0], u=log.u[0], schedule=log.schedule_at(0))
+    """Steps of an observer, or verdicts of a bank, over a log, one at a time; their models are those along the log."""
+    yield observer.update(log.y[0], u=log.u[0], schedule=0.0)
     for k in range(1, len(log)):
-        yield observer.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=log.schedule_at(k))
+        yield observer.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=float(k))

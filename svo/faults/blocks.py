@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,16 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.model import Schedulable, UncertainModel, Uncertainty
-from svo.schedule_table import ScheduleTable
+from svo.schedule_table import ScheduleTable, values_over
 
 Array = NDArray[np.float64]
 
 
 def mapped(function: Callable[..., Array], *values: Schedulable) -> Schedulable:
-    """``function``, which must be affine, of arrays; again a function of the schedule where any of them is one."""
+    """``function`` of arrays; again a function of the schedule where any of them is one.
+
+    It must be affine, and act alike with and without samples in front of the arrays.
+    """
     functions = [v for v in values if callable(v)]
     if not functions:
         return function(*(np.asarray(v, dtype=float) for v in values))
@@ -25,40 +29,50 @@ def mapped(function: Callable[..., Array], *values: Schedulable) -> Schedulable:
         return ScheduleTable.of(
             function, *(v if isinstance(v, ScheduleTable) else np.asarray(v, dtype=float) for v in values)
         )
+    return _Mapped(function, values)
 
-    def at(schedule: Any) -> Array:
-        return function(*(np.asarray(v(schedule) if callable(v) else v, dtype=float) for v in values))
 
-    return at
+@dataclass(frozen=True)
+class _Mapped:
+    """A function of arrays of which some are functions of the schedule."""
+
+    function: Callable[..., Array]
+    values: tuple[Schedulable, ...]
+
+    def __call__(self, schedule: Any) -> Array:
+        return self.function(*(np.asarray(v(schedule) if callable(v) else v, dtype=float) for v in self.values))
+
+    def over(self, schedule: Array) -> Array:
+        return self.function(*(values_over(v, schedule) for v in self.values))
 
 
 def only_columns(value: Schedulable, columns: Sequence[int], factor: float) -> Schedulable:
-    """The array with all columns zero but these, which are multiplied by ``factor``."""
-    return None if value is None else mapped(lambda m: m * _mask(m.shape[1], columns, factor), value)
+    """The matrix with all columns (vector with all entries) zero but these, which are multiplied by ``factor``."""
+    return None if value is None else mapped(lambda m: m * _mask(m.shape[-1], columns, factor), value)
 
 
 def without_columns(value: Schedulable, columns: Sequence[int]) -> Schedulable:
-    """The array with these columns set to zero."""
-    return None if value is None else mapped(lambda m: m * (1.0 - _mask(m.shape[1], columns, 1.0)), value)
+    """The matrix with these columns set to zero."""
+    return None if value is None else mapped(lambda m: m * (1.0 - _mask(m.shape[-1], columns, 1.0)), value)
 
 
 def only_rows(value: Schedulable, rows: Sequence[int], factor: float) -> Schedulable:
-    """The array (matrix or vector) with all rows zero but these, which are multiplied by ``factor``."""
-    return None if value is None else mapped(lambda m: (m.T * _mask(len(m), rows, factor)).T, value)
+    """The matrix with all rows zero but these, which are multiplied by ``factor``."""
+    return None if value is None else mapped(lambda m: m * _mask(m.shape[-2], rows, factor)[:, None], value)
 
 
 def sum_of_columns(value: Schedulable, columns: Sequence[int], factor: float) -> Schedulable:
     """``factor`` times the sum of these columns, a vector."""
-    return None if value is None else mapped(lambda m: factor * m[:, list(columns)].sum(axis=1), value)
+    return None if value is None else mapped(lambda m: factor * m[..., list(columns)].sum(axis=-1), value)
 
 
 def with_new_columns(value: Schedulable, source: Schedulable, columns: Sequence[int], width: int) -> Schedulable:
     """``value`` (``width`` columns, zero if absent) followed by these columns of ``source``; absent if both are."""
     if source is None:
-        return None if value is None else mapped(lambda m: np.hstack([m, np.zeros((len(m), len(columns)))]), value)
+        return None if value is None else mapped(lambda m: _beside(m, _zeros(m, len(columns))), value)
     if value is None:
-        return mapped(lambda s: np.hstack([np.zeros((len(s), width)), s[:, list(columns)]]), source)
-    return mapped(lambda m, s: np.hstack([m, s[:, list(columns)]]), value, source)
+        return mapped(lambda s: _beside(_zeros(s, width), s[..., list(columns)]), source)
+    return mapped(lambda m, s: _beside(m, s[..., list(columns)]), value, source)
 
 
 def with_new_disturbances(model: UncertainModel, lower: float, upper: float, count: int) -> Any:
@@ -66,13 +80,18 @@ def with_new_disturbances(model: UncertainModel, lower: float, upper: float, cou
     low, high = np.full(count, lower), np.full(count, upper)
     if isinstance(model.w, HPolytope):
         return model.w.product(HPolytope.box(low, high))
-    if isinstance(model.w, tuple) and any(callable(b) for b in model.w):
-        return (
-            lambda schedule: np.concatenate([model.bounds(schedule)[0], low]),
-            lambda schedule: np.concatenate([model.bounds(schedule)[1], high]),
-        )
-    known = model.bounds(model.schedule)
-    return np.concatenate([known[0], low]), np.concatenate([known[1], high])
+    edges = disturbance_edges(model)
+    return tuple(
+        mapped(lambda edge, n=new: _beside(edge, np.broadcast_to(n, (*edge.shape[:-1], count))), edge)
+        for edge, new in zip(edges, (low, high), strict=True)
+    )
+
+
+def disturbance_edges(model: UncertainModel) -> tuple[Schedulable, Schedulable]:
+    """Lower and upper bound (nw,) of the disturbances, each an array or a function of the schedule."""
+    lower, upper, _ = model.bounds(model.schedule)
+    low, high = model.w if isinstance(model.w, tuple) else (None, None)
+    return low if callable(low) else lower, high if callable(high) else upper
 
 
 def with_noise(model: UncertainModel, function: Callable[[Array], Array]) -> Schedulable:
@@ -114,6 +133,14 @@ def check_channels(where: Sequence[int], count: int, what: str) -> None:
     """Refuse indices that the model or vector does not have."""
     if max(where) >= count:
         raise ValueError(f"where is {tuple(where)} but there are {count} {what}; expected indices below {count}")
+
+
+def _beside(left: Array, right: Array) -> Array:
+    return np.concatenate([left, right], axis=-1)
+
+
+def _zeros(like: Array, width: int) -> Array:
+    return np.zeros((*like.shape[:-1], width))
 
 
 def _mask(size: int, indices: Sequence[int], factor: float) -> Array:

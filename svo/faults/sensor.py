@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from svo.checks import is_finite_number
-from svo.faults.blocks import channels, check_channels, mapped, only_rows, product_of, with_noise
+from svo.faults.blocks import channels, check_channels, mapped, only_columns, only_rows, product_of, with_noise
 from svo.faults.profiles import Profile, at_times, check_profile
 from svo.model import Schedulable, UncertainModel, Uncertainty
 
@@ -130,8 +130,14 @@ class SensorFault:
     def _factor(self) -> float:
         return -1.0 if self.kind == "hard" else 1.0
 
+    def _rows(self, owner: UncertainModel | Uncertainty) -> dict[str, Schedulable]:
+        """What the faulty sensors read, scaled, and nothing of the others."""
+        where = channels(self.where)
+        matrices = {name: only_rows(getattr(owner, name), where, self._factor) for name in "CDF"}
+        return matrices | {"c": only_columns(owner.c, where, self._factor)}
+
     def _scaling(self, nominal: UncertainModel) -> Uncertainty:
-        rows = {name: only_rows(getattr(nominal, name), channels(self.where), self._factor) for name in "CDcF"}
+        rows = self._rows(nominal)
         if self.kind == "hard":
             target = np.zeros(nominal.n_outputs)
             target[list(channels(self.where))] = self.magnitude
@@ -141,8 +147,7 @@ class SensorFault:
     def _products(self, nominal: UncertainModel) -> list[Uncertainty]:
         products = []
         for uncertainty in nominal.uncertainties:
-            rows = {name: only_rows(getattr(uncertainty, name), channels(self.where), self._factor) for name in "CDcF"}
-            products.append(product_of(uncertainty, self._bounds, self.kind, **rows))
+            products.append(product_of(uncertainty, self._bounds, self.kind, **self._rows(uncertainty)))
         return [p for p in products if p is not None]
 
     def _wider_noise(self, nominal: UncertainModel, gain: float, offset: float) -> Schedulable:

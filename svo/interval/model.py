@@ -9,6 +9,7 @@ gr.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,20 @@ from svo.model import UncertainModel
 from svo.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """An array of one number that is a formula of gc, gr, hc and spread; ``over`` many rows (K, 4) of them too."""
+
+    formula: Callable[..., Any]
+    shape: tuple[int, ...] = (1,)
+
+    def __call__(self, schedule: Array) -> Array:
+        return np.reshape(self.formula(*schedule), self.shape)
+
+    def over(self, schedule: Array) -> Array:
+        return np.reshape(self.formula(*schedule.T), (len(schedule), *self.shape))
 
 
 def first_order_model(noise: float, Ts: float) -> UncertainModel:
@@ -38,14 +53,20 @@ def first_order_model(noise: float, Ts: float) -> UncertainModel:
         Its schedule is a row (gc, gr, hc, spread) of `first_order_schedule`.
     """
     return UncertainModel(
-        A=lambda s: [[s[0]]],
-        B=lambda s: [[(1 - s[0]) * s[2]]],
+        A=_Entry(lambda gc, gr, hc, spread: gc, (1, 1)),
+        B=_Entry(lambda gc, gr, hc, spread: (1 - gc) * hc, (1, 1)),
         C=[[1.0]],
         E=[[1.0]],
-        w=(lambda s: np.array([-s[3]]), lambda s: np.array([s[3]])),
+        w=(_Entry(lambda gc, gr, hc, spread: -spread), _Entry(lambda gc, gr, hc, spread: spread)),
         n=noise,
         Ts=Ts,
-        uncertainties=[Uncertainty(A=lambda s: [[s[1]]], B=lambda s: [[-s[1] * s[2]]], name="g")],
+        uncertainties=[
+            Uncertainty(
+                A=_Entry(lambda gc, gr, hc, spread: gr, (1, 1)),
+                B=_Entry(lambda gc, gr, hc, spread: -gr * hc, (1, 1)),
+                name="g",
+            )
+        ],
         schedule=np.array([0.5, 0.1, 1.0, 0.0]),
     )
 

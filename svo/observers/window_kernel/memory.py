@@ -36,7 +36,6 @@ CONSISTENT, EMPTY_CANDIDATE, UNDECIDED = 0, 1, 2
 # it drops `block` at once, K largest basis, late = 1 if the output depends on w or a channel
 Sizes = namedtuple("Sizes", "n nu nw ny nq nh nt na ni N block K late")
 
-CLOCK = ("base", "time", "pending", "started", "pivots", "stops", "programs", "refactored")
 BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED = range(8)
 
 # Every array of a window: its shape by the letters of `_lengths` (S samples, V slots of variables, Z variables,

@@ -105,4 +105,4 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(ValueError, match="noise is 'loud'"):
         PLANT.models("loud")
     with pytest.raises(ValueError, match="12 finite measurements"):
-        Embedding(Airframe(), TS).at(np.zeros(3))
+        Embedding(Airframe(), TS).blocks_over(np.zeros(3))
