@@ -47,6 +47,20 @@ def _foreseen(formed: int, dimension: int) -> float:
     return (0.5 * share * formed) ** 2
 
 
+@njit(error_model="numpy")
+def _scaled(table: Matrix) -> Matrix:
+    """Rows ``[A, b]`` over powers of two, so that no product of two coefficients leaves the range of floats."""
+    scaled = table.copy()
+    for i in range(table.shape[0]):
+        largest = 0.0
+        for j in range(table.shape[1] - 1):
+            largest = max(largest, abs(table[i, j]))
+        factor = math.ldexp(1.0, min(-math.frexp(largest)[1], 1000))
+        for j in range(table.shape[1]):
+            scaled[i, j] *= factor
+    return scaled
+
+
 @njit(error_model="numpy")  # products and sums as written: rows of small integers stay exact
 def _combined(table: Matrix, known: Index, j: int, formed: int) -> tuple[Matrix, Index]:
     """All rows ``[A, b]`` without x_j and all pairs in which it cancels, scaled by powers of two; no zero rows.
@@ -131,6 +145,7 @@ def eliminate(
     state : int
         `FINISHED`, `TOO_MANY`, `OPEN` (rows are doubtful) or `PAUSED` (after a long step).
     """
+    table = _scaled(table)
     trace, steps, long = np.zeros((columns.size, 2), np.int64), 0, False
     doubtful, least = np.zeros(table.shape[0], np.int64), table.shape[0]
     while True:
