@@ -175,6 +175,22 @@ def test_a_hull_is_flat_only_if_the_union_is() -> None:
         assert H.contains(flat, tol=1e-15 * (3 - dimension))
 
 
+@pytest.mark.parametrize("width", [0.0, 1e-13, 1.0])
+def test_a_sum_by_vertices_is_flat_only_if_the_sum_is(monkeypatch: pytest.MonkeyPatch, width: float) -> None:
+    """A part of a plane, and beside the plane a segment or a slab parallel to it."""
+    monkeypatch.setattr("polytopes.combinations._CHEAP_ROWS", 1)
+    box, normal = HPolytope.box([-1.0] * 3, [1.0] * 3), np.array([1.0, 2.0, 3.0])
+    P = HPolytope(box.A, box.b, [normal], [0.5])
+    if width == 0.0:
+        Q = HPolytope(box.A, box.b, [normal, [0.0, 1.0, 1.0]], [1.5, 0.0])
+    else:
+        Q = HPolytope(np.vstack([box.A, normal, -normal]), np.append(box.b, [width + 1.5, -1.5]))
+    S, exact = P.minkowski_sum(Q), exact_sum(P, Q)
+    assert S.d.size == (width == 0.0)
+    for row, value in zip(S.A, S.b, strict=True):
+        assert exact_support(exact, row) <= Fraction(float(value)) + Fraction(1e-14) * (width != 1e-13)
+
+
 def test_qhull_never_reaches_the_user_with_an_error_of_its_own() -> None:
     """Thin sets through their vertices: a hull that holds them all, or an error that says what is undecided."""
     for trial in range(60):
