@@ -141,7 +141,7 @@ def test_skew_slabs_through_their_vertices_keep_their_width(width: float) -> Non
 def test_a_hull_contains_sets_of_any_width(width: float) -> None:
     """Two slabs that lie together, or a slab and a small set, as thin as rounding: neither is missed, nor made flat.
 
-    To 1e-9 of the own width of a set along each row, which is what merging of vertices may cost; and the hull is at
+    To 2e-9 of the own width of a set along each row, about what merging of vertices may cost; and the hull is at
     most some units of the last place too wide.
     """
     for trial in range(15):
