@@ -1,11 +1,8 @@
 """The choices inside the polytope engine: which method projects, and redundancy by programs against Qhull's dual hull.
 
-Run with ``python -m benchmarks.polytope_methods``.  Times are CPU milliseconds, the better of two runs, on random rows.
+Run with ``python -m benchmarks.polytope_methods``.  Times are CPU milliseconds, best of several runs, on random rows.
 Qhull's dual hull is timed alone: its answer would have to be confirmed by programs to be exact.
 """
-
-from collections.abc import Callable
-from time import process_time
 
 import numpy as np
 from rich.console import Console
@@ -13,7 +10,7 @@ from rich.table import Table
 from scipy.spatial import ConvexHull
 
 from benchmarks.lp_kernel import random_polytope
-from benchmarks.polytopes import sparse_polytope
+from benchmarks.polytopes import shortest, sparse_polytope
 from polytopes import HPolytope, ProjectionLimitError, warm_up
 from polytopes.redundancy import irredundant
 
@@ -25,23 +22,13 @@ METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
 REDUNDANCIES = ((2, 500), (2, 1000), (2, 5000), (3, 500), (3, 2000), (3, 4000), (4, 200), (4, 800), (4, 2000), (5, 800))
 
 
-def milliseconds(task: Callable[[], object]) -> float:
-    """CPU time, the better of two runs."""
-    times = []
-    for _ in range(2):
-        start = process_time()
-        task()
-        times.append(process_time() - start)
-    return 1e3 * min(times)
-
-
 def projection(P: HPolytope, kept: int, method: str) -> str:
     """Time of one method; nothing where it has too many rows or vertices."""
     if method == "vertices" and P.dim > 6 and P.b.size > 40:
         return "-"
     rows = 3000 if method == "fourier-motzkin" else 20_000
     try:
-        return f"{milliseconds(lambda: HPolytope(P.A, P.b).project(range(kept), method, rows)):.1f}"
+        return f"{1e3 * shortest(lambda: HPolytope(P.A, P.b).project(range(kept), method, rows)):.2f}"
     except ProjectionLimitError:
         return "-"
 
@@ -52,7 +39,7 @@ def redundancy(variables: int, rows: int, tangent: bool) -> tuple[float, float]:
     program = HPolytope(P.A, np.ones(rows)).program if tangent else P.program
     AT, b, centre = program.AT, program.rhs, program.interior.point
     dual = (AT / (b - centre @ AT)).T
-    return milliseconds(lambda: irredundant(AT, b, centre)), milliseconds(lambda: ConvexHull(dual))
+    return 1e3 * shortest(lambda: irredundant(AT, b, centre)), 1e3 * shortest(lambda: ConvexHull(dual))
 
 
 def main() -> None:

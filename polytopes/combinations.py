@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.affine_hull import dimension_of_sum, dimension_of_union
 from polytopes.errors import ProjectionLimitError
 from polytopes.exact import ZERO, rational, rational_vector, row_to_floats
 from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
@@ -82,7 +83,7 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
     except ProjectionLimitError:
         if is_bounded(P) and is_bounded(Q):
             sums = vertices(P)[:, None, :] + vertices(Q)
-            return rows_of_points(sums.reshape(-1, n))
+            return rows_of_points(sums.reshape(-1, n), lambda: dimension_of_sum(P, Q))
         return project(lifted, range(n), "fourier-motzkin", _MAX_ROWS, False)
 
 
@@ -144,7 +145,7 @@ def hull_of_union(sets: Sequence[Rows]) -> Table:
     if len(some) == 1:
         return some[0].A.copy(), some[0].b.copy(), some[0].C.copy(), some[0].d.copy()
     if all(is_bounded(P) for P in some):
-        return rows_of_points(np.vstack([vertices(P) for P in some]))
+        return rows_of_points(np.vstack([vertices(P) for P in some]), lambda: dimension_of_union(some))
     return project(_balas(some), range(n), "auto", _MAX_ROWS, False)
 
 

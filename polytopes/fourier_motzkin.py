@@ -1,8 +1,9 @@
-"""Fourier-Motzkin elimination with redundancy removal after every variable.
+"""Fourier-Motzkin elimination with redundancy removal.
 
 To eliminate x_j from ``A x <= b``, rows without x_j stay, and every row with a positive coefficient is added to every
-row with a negative one so that x_j cancels (Fourier 1826; Motzkin 1936).  The pairs are pruned by linear programs at
-once, so each step starts from a minimal description.
+row with a negative one so that x_j cancels (Fourier 1826; Motzkin 1936).  Linear programs prune the rows before every
+step that would form many more than the last pruning left, and at the end: a step that forms many starts from a minimal
+description, and where rows are sparse several cheap steps share one pruning.
 
 Chernikov's rule, which skips rows made of too many original ones, is exact on its own but not together with pruning by
 linear programs (a pruned row takes its history with it), so it is not used.
@@ -54,7 +55,7 @@ def eliminate(
     """
     warm_up()
     inner, left, rest = np.ascontiguousarray(inner), np.arange(A.shape[1]), np.array(columns, dtype=np.int64)
-    table, known = np.column_stack([A, b]), np.zeros(b.size, np.int64)
+    table, known = np.concatenate([A, b[:, None]], axis=1), np.zeros(b.size, np.int64)
     done, state = 0, kernel.PAUSED
     while state != kernel.FINISHED:
         table, left, rest, inner, doubtful, trace, formed, state = kernel.eliminate(

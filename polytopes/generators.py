@@ -45,7 +45,7 @@ def generators(P: Rows) -> Generators:
     """
     if not known_nonempty(P):
         raise EmptySetError("the empty set has no generators; ask emptiness() first.")
-    size = float(np.ldexp(1.0, np.frexp(P.program.size)[1]))  # a power of two: what is flat stays flat
+    size = float(np.ldexp(1.0, np.frexp(P.program.size)[1] - 1))  # a power of two: what is flat stays flat
     equalities = np.hstack([P.C, -P.d[:, None] / size])
     last = np.append(np.zeros(P.dim), -1.0)
     rays, lines = _cone(np.vstack([np.hstack([P.A, -P.b[:, None] / size]), last, equalities, -equalities]))
@@ -108,6 +108,8 @@ def _normals(V: Floats, rays: Floats) -> Floats:
 def _cone(G: Floats) -> tuple[Floats, Floats]:
     """Extreme rays and lines of ``{y : G y <= 0}``."""
     n = G.shape[1]
+    largest = np.abs(G).max(axis=1)
+    G = np.ldexp(G, -np.frexp(np.where(largest > 0.0, largest, 0.5))[1][:, None])  # rows whose squares are floats
     null = affine_set(G, np.zeros(len(G)))
     across = G[:, null.pivots]
     lengths = np.linalg.norm(across, axis=1)

@@ -1,5 +1,6 @@
 """Convex hulls: of points, and of a set known only by its support points."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from polytopes.redundancy import irredundant
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _FLAT = 1e-12  # relative width below which points are taken to lie in a subspace
+_THIN = 1e-6  # relative width below which rounding is no longer small beside it
+_OUTWARD = 4.0 * float(np.finfo(np.float64).eps)
 _NOISE = 1e-15  # width of a coordinate, relative to the largest one, that may be rounding
 _SLIVER = 1e-5  # relative volume and least edge of a simplex that fixes its hyperplane
 _TOUCHING = 1e-13  # distance from a hyperplane at which a point lies on it (widths are about one)
@@ -19,11 +22,19 @@ _ALIKE = 1e-6  # distance between two rows below which they may be one facet
 _REACHED = 1e-11  # a facet is final if no point of the set lies this far beyond it (widths are about one)
 
 
-def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def rows_of_points(V: Floats, dimension: Callable[[], int] | None = None) -> tuple[Floats, Floats, Floats, Floats]:
     """Rows A, b, C, d of the convex hull of points (k, n), k >= 1.
 
-    Points within 1e-12 of their spread of a subspace give explicit equalities.  Every right-hand side is the maximum
-    over the points, so that each point satisfies its rows to rounding.
+    Every right-hand side is the maximum over the points, so that each point satisfies its rows to rounding.  Where the
+    hull is thinner than 1e-6 of its size, they are rounded outward by 4 units of the last place of the terms of
+    ``a'x``: points that were rounded stand for a set, which must not be missed by a good part of its width.
+
+    Parameters
+    ----------
+    V : array (k, n)
+    dimension : callable, optional
+        Tells the dimension of the hull where it is known exactly and points within 1e-12 of their spread of a subspace
+        leave it open; without it they give explicit equalities.
     """
     n = V.shape[1]
     centre = V.mean(axis=0)
@@ -31,6 +42,9 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     offsets = (V - centre) / scale
     sizes, axes = principal_axes(offsets)
     rank = int(np.count_nonzero(sizes > _FLAT * sizes[0]))
+    if rank < n and dimension is not None:
+        rank = dimension()
+        sizes = np.maximum(sizes, _NOISE * (sizes[0] or 1.0))
     C = _unit(axes[rank:] / scale)
     d = C @ centre
     if rank == 0:
@@ -40,7 +54,10 @@ def rows_of_points(V: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     if not found.certain():
         rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(rank))]
     normals = _unit(rows / sizes[:rank] @ axes[:rank] / scale)
-    return normals, (V @ normals.T).max(axis=0), C, d
+    b = (V @ normals.T).max(axis=0)
+    if sizes[rank - 1] < _THIN * sizes[0]:
+        b += _OUTWARD * (np.abs(normals) @ np.abs(V).max(axis=0))
+    return normals, b, C, d
 
 
 def normals_of_span(directions: Floats) -> Floats:

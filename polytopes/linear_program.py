@@ -29,6 +29,8 @@ _CLEAN = 1e-9  # relative violation of the optimality conditions that is still a
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
 _SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
 _NOISE = 1e-15  # width, relative to the coordinates, that may be rounding
+_SQUARABLE = 1e100  # norms of rows up to here, and down to its reciprocal, may be squared
+_FARTHEST = 1e150  # distance of a hyperplane from the origin; the squares of coordinates beyond are no floats
 _UNEVEN = 256.0  # ratio of the widths along two axes from which the axes are scaled
 
 _ANNOUNCE_AFTER = 1.5  # seconds; loading the kernels from the cache takes less
@@ -121,8 +123,15 @@ class Program:
 
     @cached_property
     def size(self) -> float:
-        """The size that tolerances refer to: the largest entry of the scaled b, or 1."""
-        return float(np.abs(self.rhs).max(initial=0.0)) or 1.0
+        """The size that tolerances refer to: the largest entry of the scaled b, or 1; ValueError beyond 1e150."""
+        size = float(np.abs(self.rhs).max(initial=0.0)) or 1.0
+        if size > _FARTHEST:
+            far = int(self.kept[np.abs(self.rhs).argmax()])
+            raise ValueError(
+                f"row {far} of A bounds {self.A[far].tolist()} x by {self.b[far]:.3g}, some {size:.1g} from the "
+                f"origin; expected at most {_FARTHEST:g}. Use other units, or leave out a row that is not to bound."
+            )
+        return size
 
     @cached_property
     def _small(self) -> bool:
@@ -296,17 +305,32 @@ def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
     """
     flat = affine_set(C, d)
     rows, rhs = flat.restrict(A, b)
-    norms = np.sqrt((rows * rows).sum(axis=1))
-    kept, violated = np.arange(b.size), None
-    if not norms.all():
+    norms, kept, violated, factors = _norms(rows), np.arange(b.size), None, None
+    if np.count_nonzero((norms > 1.0 / _SQUARABLE) & (norms < _SQUARABLE)) < b.size:
+        rows, rhs, factors = _squarable(rows, rhs)
+        norms = _norms(rows)
         failing = np.flatnonzero((norms == 0.0) & (rhs < 0.0))
         violated = int(failing[0]) if failing.size else None
         kept = np.flatnonzero(norms)
-        rows, rhs, norms = rows[kept], rhs[kept], norms[kept]
+        rows, rhs, norms, factors = rows[kept], rhs[kept], norms[kept], factors[kept]
     scale = np.ldexp(1.0, -np.frexp(norms)[1])
     AT = np.ascontiguousarray(rows.T) * scale
     lengths = norms * scale if not flat.pivots else _metric_norms(AT.T, flat)
-    return Program(A, b, flat, AT, rhs * scale, lengths, scale, np.ones(len(flat.free)), kept, violated)
+    total = scale if factors is None else scale * factors
+    return Program(A, b, flat, AT, rhs * scale, lengths, total, np.ones(len(flat.free)), kept, violated)
+
+
+def _norms(rows: Floats) -> Floats:
+    norms: Floats = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    return norms
+
+
+def _squarable(rows: Floats, rhs: Floats) -> tuple[Floats, Floats, Floats]:
+    """Rows whose largest entry is about one, but rows of zeros as they are, and the powers of two that made them so."""
+    largest = np.abs(rows).max(axis=1, initial=0.0)
+    factors = np.ldexp(1.0, np.minimum(-np.frexp(np.where(largest > 0.0, largest, 0.5))[1], 1000))
+    with np.errstate(over="ignore"):  # a bound of infinity is refused later, where its row is known
+        return rows * factors[:, None], rhs * factors, factors
 
 
 def _uncapped(radius: float, cap: float) -> float:

@@ -106,7 +106,7 @@ def _project_body(
     if method == "auto":
         return _project_automatically(P, k, inner, max_rows, outer)
     if method == "vertices":
-        return rows_of_points(vertices(P)[:, :k])[:2]
+        return rows_of_points(vertices(P)[:, :k], lambda: k)[:2]
     if method == "convex-hull":
         return hull_by_supports(lambda directions: _shadow_points(P, directions), inner[:k])
     try:

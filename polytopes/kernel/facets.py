@@ -219,6 +219,25 @@ def _best_corner(corners: Matrix, count: int, c: Vector) -> int:
     return best
 
 
+@njit(error_model="numpy")
+def _copy(x: Vector, W: Index, Q: Matrix, to_x: Vector, to_W: Index, to_Q: Matrix) -> None:
+    """A vertex, its basis and the inverse, entry by entry: assignments of arrays would cost more than a pivot."""
+    d = x.shape[0]
+    for j in range(d):
+        to_x[j], to_W[j] = x[j], W[j]
+        for k in range(d):
+            to_Q[j, k] = Q[j, k]
+
+
+@njit(error_model="numpy")
+def _same(V: Index, W: Index) -> bool:
+    """Whether two bases hold the same rows in the same slots."""
+    same = True
+    for k in range(W.shape[0]):
+        same &= V[k] == W[k]
+    return same
+
+
 @njit(error_model="numpy", fastmath=FAST)
 def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
     """Programs only over rows already known to be facets; a violation finds a new facet by a ray (Clarkson 1994).
@@ -234,7 +253,8 @@ def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
     tries = 2 * d  # rays are worth their while as long as most of them find a facet
     for i in range(m):
         if state[i] == 0 and tries > 0:
-            c[:] = AT[:, i]
+            for j in range(d):
+                c[j] = AT[j, i]
             row, tie = _first_hit(AT, reach, c, rate)
             if tie or state[row] != 0:
                 tries -= 1
@@ -245,7 +265,8 @@ def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
     n = 0
     for i in range(m):
         if state[i] == 1:
-            facets[:, n] = AT[:, i]
+            for j in range(d):
+                facets[j, n] = AT[j, i]
             values[n] = b[i]
             n += 1
     system, rhs = np.ascontiguousarray(facets[:, :n]), values[:n].copy()
@@ -262,14 +283,14 @@ def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
             if begin < 0:
                 at_origin(x, W, Q)
             else:
-                x[:], W[:], Q[:, :] = corners[begin], bases[begin], inverses[begin]
+                _copy(corners[begin], bases[begin], inverses[begin], x, W, Q)
                 age = ages[begin]
             answer = _exceeds(system, rhs, c, b[i], x, W, Q)
             if answer == _NO:
                 state[i] = 2
-                new = count < room and (begin < 0 or (bases[begin] != W).any())
+                new = count < room and (begin < 0 or not _same(bases[begin], W))
                 if new and (age < _FRESH or invert_basis(system, W, Q, work)):
-                    corners[count], bases[count], inverses[count] = x, W, Q
+                    _copy(x, W, Q, corners[count], bases[count], inverses[count])
                     ages[count] = age + 1 if age < _FRESH else 0
                     count += 1
                 continue
@@ -280,7 +301,8 @@ def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
                 row = i
                 doubtful[i] = 1
             state[row] = 1
-            facets[:, n] = AT[:, row]
+            for j in range(d):
+                facets[j, n] = AT[j, row]
             values[n] = b[row]
             n += 1
             system, rhs = np.ascontiguousarray(facets[:, :n]), values[:n].copy()
@@ -290,8 +312,8 @@ def _clarkson(AT: Matrix, b: Vector, known: Index) -> tuple[Index, Index]:
                     value += corners[k, j] * AT[j, row]
                 if value > b[row]:
                     count -= 1
-                    corners[k], bases[k] = corners[count], bases[count]
-                    inverses[k], ages[k] = inverses[count], ages[count]
+                    _copy(corners[count], bases[count], inverses[count], corners[k], bases[k], inverses[k])
+                    ages[k] = ages[count]
     keep = np.zeros(m, np.int64)
     for i in range(m):
         keep[i] = 1 if state[i] == 1 else 0

@@ -37,7 +37,8 @@ FAST = {"nnan", "nsz", "reassoc", "contract"}
 def slacks(AT: Matrix, b: Vector, x: Vector, s: Vector) -> None:
     """s = b - A x."""
     d, m = AT.shape
-    s[:] = b
+    for i in range(m):  # an assignment of arrays would cost more than the rest
+        s[i] = b[i]
     for j in range(d):
         xj = x[j]
         for i in range(m):
@@ -172,7 +173,7 @@ def ascend(
 ) -> int:
     """Primal simplex from the feasible state (x, s, W, Q); leaves the multipliers in y."""
     d, m = AT.shape
-    p, alpha, rate, work = np.empty(d), np.empty(d), np.empty(m), np.empty((d, 2 * d))
+    p, alpha, rate = np.empty(d), np.empty(d), np.empty(m)
     size = 0.0
     for j in range(d):
         size += c[j] * c[j]
@@ -230,7 +231,7 @@ def ascend(
         age += 1
         if age >= _REFACTOR:
             age = 0
-            if not invert_basis(AT, W, Q, work):
+            if not invert_basis(AT, W, Q, np.empty((d, 2 * d))):
                 return LIMIT
             _settle(AT, b, x, s, W, Q)
     return LIMIT
@@ -240,7 +241,7 @@ def ascend(
 def repair(AT: Matrix, b: Vector, x: Vector, s: Vector, W: Index, Q: Matrix, y: Vector, scale: float) -> int:
     """Dual simplex steps from an optimal basis whose vertex is infeasible by about the Harris tolerance."""
     d, m = AT.shape
-    alpha, work = np.empty(d), np.empty((d, 2 * d))
+    alpha = np.empty(d)
     for attempt in range(2 * d + 10):
         _settle(AT, b, x, s, W, Q)
         reach = scale
@@ -251,7 +252,7 @@ def repair(AT: Matrix, b: Vector, x: Vector, s: Vector, W: Index, Q: Matrix, y: 
             worst = min(worst, s[i])
         if worst >= -64.0 * EPS * reach:
             return OPTIMAL
-        if attempt == d and not invert_basis(AT, W, Q, work):
+        if attempt == d and not invert_basis(AT, W, Q, np.empty((d, 2 * d))):
             return LIMIT
         row = 0
         while s[row] != worst:
@@ -290,11 +291,11 @@ def optimise(
 def at_origin(x: Vector, W: Index, Q: Matrix) -> None:
     """Point and basis at the origin: every slot artificial."""
     d = x.shape[0]
-    Q[:, :] = 0.0
     for j in range(d):
         x[j] = 0.0
         W[j] = -1 - j
-        Q[j, j] = 1.0
+        for k in range(d):
+            Q[j, k] = 1.0 if j == k else 0.0
 
 
 @njit(error_model="numpy", fastmath=FAST)

@@ -8,6 +8,7 @@ from exact_sets import minimal_size, polyhedron
 from sets import CATALOGUE, EMPTY
 
 from polytopes import Certificate, HPolytope, UnboundedError, convex_hull
+from polytopes.projection import METHODS
 
 
 def test_a_thin_rectangle_has_four_vertices() -> None:
@@ -115,6 +116,34 @@ def random_unbounded(rng: np.random.Generator, n: int) -> HPolytope:
     A = rng.integers(-3, 4, (m, n)).astype(float)
     A = A[A.any(axis=1)]
     return HPolytope(A, rng.integers(1, 5, len(A)))
+
+
+@pytest.mark.parametrize("power", [-900, -600, 600, 900])
+def test_rows_may_be_multiplied_by_any_number(power: int) -> None:
+    """Also by numbers whose squares are no floats: the set, and what follows from it, stays the same."""
+    rng = np.random.default_rng(3)
+    A = np.vstack([rng.integers(-3, 4, (8, 3)), np.eye(3), -np.eye(3)]).astype(float)
+    b = rng.integers(1, 4, 14).astype(float)
+    factors = np.where(rng.random(14) < 0.5, 2.0**power, 1.0)
+    P, Q = HPolytope(A, b), HPolytope(A * factors[:, None], b * factors)
+    c = rng.integers(-4, 5, (20, 3))
+    np.testing.assert_allclose(Q.support(c), P.support(c), rtol=1e-12)
+    np.testing.assert_allclose(Q.vertices(), P.vertices(), atol=1e-12)
+    assert len(Q.generators().vertices) == len(P.generators().vertices)
+    assert Q.remove_redundancy().b.size == P.remove_redundancy().b.size
+    for method in METHODS:
+        assert Q.project([0, 1], method).equals(P.project([0, 1], method), tol=1e-12)
+    corner = HPolytope([[2.0**power, 0.0], [0.0, -1.0]], [2.0**power, 0.0]).generators()
+    assert (len(corner.vertices), len(corner.rays)) == (1, 2)
+
+
+@pytest.mark.parametrize("bound", [1e200, 9e307])
+def test_bounds_beyond_the_squares_of_floats_are_refused(bound: float) -> None:
+    """No infinity, no NaN and no ZeroDivisionError: the row and the limit are named."""
+    for P in (HPolytope.box([0.0, 0.0], [bound, 1.0]), HPolytope([[1.0, 1.0]], [bound])):
+        for question in (P.emptiness, P.bounding_box, P.vertices, P.generators, P.remove_redundancy):
+            with pytest.raises(ValueError, match=r"row 0 of A bounds .* from the origin; expected at most 1e"):
+                question()
 
 
 @pytest.mark.parametrize("rank", [2, 3])

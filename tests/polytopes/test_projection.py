@@ -39,6 +39,25 @@ def test_degenerate_integer_systems_match_the_exact_oracle() -> None:
         assert (minimal.b.size, minimal.d.size) == (minimal_size(exact) if not exact.is_empty() else (1, 0)), trial
 
 
+@pytest.mark.parametrize("bounded", [True, False])
+def test_sparse_systems_whose_steps_go_unpruned_match_the_exact_oracle(bounded: bool) -> None:
+    """Rows of two integers in 5 to 7 coordinates: what elimination returns is the shadow, and minimal as it is."""
+    rng = np.random.default_rng(7)
+    for trial in range(40):
+        n = int(rng.integers(5, 8))
+        A = np.zeros((int(rng.integers(n, 3 * n)), n))
+        for row in A:
+            row[rng.choice(n, 2, replace=False)] = rng.choice([-3, -2, -1, 1, 2, 3], 2)
+        P = HPolytope(A, rng.integers(1, 6, len(A)))
+        if bounded:
+            P = P.intersection(HPolytope.box(np.full(n, -4.0), np.full(n, 4.0)))
+        keep = rng.permutation(n)[: int(rng.integers(1, 4))].tolist()
+        Q, exact = P.project(keep, method="fourier-motzkin"), shadow(P, keep)
+        c = random_directions(len(keep))
+        np.testing.assert_allclose(Q.support(c), supports(exact, c), atol=1e-9, err_msg=str(trial))
+        assert (Q.b.size, Q.d.size) == minimal_size(exact), trial
+
+
 def test_pruning_by_programs_is_not_mixed_with_histories_of_rows() -> None:
     table = np.array(
         [[0, 0, -1, 1], [0, 1, 1, 0], [1, 0, 0, 3], [0, 1, -1, 0],

@@ -137,6 +137,60 @@ def test_skew_slabs_through_their_vertices_keep_their_width(width: float) -> Non
                 assert abs(Fraction(float(value)) - upper) <= 1e-6 * (upper - lower), (name, trial)
 
 
+@pytest.mark.parametrize("width", [1e-9, 1e-11, 1e-13])
+def test_a_hull_contains_sets_of_any_width(width: float) -> None:
+    """Two slabs that lie together, or a slab and a small set, as thin as rounding: neither is missed, nor made flat.
+
+    To 2e-9 of the own width of a set along each row, about what merging of vertices may cost; and the hull is at
+    most some units of the last place too wide.
+    """
+    for trial in range(15):
+        rng = np.random.default_rng([10, trial])
+        n = int(rng.integers(2, 5))
+        A, b, scales = uneven_set(rng, n, 4.0 * (trial % 2), width)
+        rows, rhs, _ = uneven_set(rng, n, 0.0)
+        P, small = HPolytope(A, b), HPolytope(rows / scales, rhs * 2.0 ** np.round(np.log2(width)))
+        moved = HPolytope(A, b + A @ (rng.integers(-3, 4, n) * scales * width))
+        for Q in (small, moved):
+            H, exact = convex_hull([P, Q]), polyhedron(P)
+            assert H.d.size == 0, trial
+            exact.poly_hull_assign(polyhedron(Q))
+            for R in (polyhedron(P), polyhedron(Q)):
+                for row, value in zip(H.A, H.b, strict=True):
+                    upper, lower = exact_support(R, row), -exact_support(R, -row)
+                    assert upper - Fraction(float(value)) <= 2e-9 * (upper - lower), trial
+            for row, value in zip(H.A, H.b, strict=True):
+                assert Fraction(float(value)) - exact_support(exact, row) <= 1e-14 * float(np.abs(row) @ scales), trial
+
+
+def test_a_hull_is_flat_only_if_the_union_is() -> None:
+    """Equalities come from the exact dimension of the union, not from how near its points are to a plane."""
+    plane, line = [[1.0, 2.0, 3.0]], [[1.0, 2.0, 3.0], [1.0, -1.0, 0.0]]
+    box = HPolytope.box([-1.0] * 3, [1.0] * 3)
+    flat = HPolytope(box.A, box.b, plane, [0.5])
+    for C, d, dimension in ((plane, [0.5], 2), (plane, [0.5 + 1e-13], 3), (line, [0.5, 0.0], 2)):
+        H = convex_hull([flat, HPolytope(box.A, box.b, C, d)])
+        assert H.affine_dim() == dimension
+        assert H.d.size == 3 - dimension
+        assert H.contains(flat, tol=1e-15 * (3 - dimension))
+
+
+@pytest.mark.parametrize("width", [0.0, 1e-13, 1.0])
+def test_a_sum_by_vertices_is_flat_only_if_the_sum_is(monkeypatch: pytest.MonkeyPatch, width: float) -> None:
+    """A part of a plane, and beside the plane a segment or a slab parallel to it."""
+    monkeypatch.setattr("polytopes.combinations._CHEAP_ROWS", 1)
+    box, normal = HPolytope.box([-1.0] * 3, [1.0] * 3), np.array([1.0, 2.0, 3.0])
+    P = HPolytope(box.A, box.b, [normal], [0.5])
+    if width == 0.0:
+        Q = HPolytope(box.A, box.b, [normal, [0.0, 1.0, 1.0]], [1.5, 0.0])
+    else:
+        Q = HPolytope(np.vstack([box.A, normal, -normal]), np.append(box.b, [width + 1.5, -1.5]))
+    S, exact = P.minkowski_sum(Q), exact_sum(P, Q)
+    assert S.d.size == (width == 0.0)
+    for row, value in zip(S.A, S.b, strict=True):
+        assert exact_support(exact, row) <= Fraction(float(value)) + Fraction(1e-14) * (width != 1e-13)
+
+
 def test_qhull_never_reaches_the_user_with_an_error_of_its_own() -> None:
     """Thin sets through their vertices: a hull that holds them all, or an error that says what is undecided."""
     for trial in range(60):
