@@ -177,10 +177,13 @@ def _refined(oracle: Oracle, n: int) -> _Facets:
         fresh = found.rows[[facet.tobytes() not in final for facet in found.rows]]
         corners = oracle(fresh[:, :-1])
         beyond = (corners * fresh[:, :-1]).sum(axis=1) + fresh[:, -1] > _REACHED
-        if not beyond.any():
+        reached = {point.tobytes() for point in points}
+        more = np.unique(corners[beyond], axis=0)
+        more = more[[corner.tobytes() not in reached for corner in more]]
+        if not len(more):  # beyond a facet only by what Qhull rounds
             return found
         final.update(facet.tobytes() for facet in fresh[~beyond])
-        points = np.vstack([points, np.unique(corners[beyond], axis=0)])
+        points = np.vstack([points, more])
 
 
 def _spanning_points(oracle: Oracle, n: int) -> Floats:

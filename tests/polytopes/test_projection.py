@@ -169,6 +169,17 @@ def test_thin_sets_keep_their_width() -> None:
         np.testing.assert_allclose(Q.support(c), slab.support(np.hstack([c, np.zeros((50, 1))])), atol=1e-9)
 
 
+def test_rows_that_floats_cannot_decide_are_settled_once() -> None:
+    """Two strips that are nearly one, met in an observer: pruning found the same four rows doubtful again for ever."""
+    rows = [[-1, -0.15566094885653387], [1, 0.15566094885653387], [1, 0.15566096631293783], [-1, -0.15566096631293783]]
+    rhs = [0.1978282179564613, -0.19782821795431732, -0.19782823833005186, 0.1978282383543622]
+    needle, turn = HPolytope(rows, rhs), np.array([[-0.03758921, -0.08368165], [-0.01104815, 0.49828023]])
+    image = needle.affine_map(turn, [-0.11385347, -0.58942963])
+    directions = np.vstack([np.eye(2), -np.eye(2)])
+    expected = needle.support(directions @ turn) + directions @ [-0.11385347, -0.58942963]
+    np.testing.assert_allclose(image.support(directions), expected, atol=1e-6)
+
+
 def test_wrong_arguments_are_refused() -> None:
     P = HPolytope.box([0.0, 0.0], [1.0, 1.0])
     for keep in ([], [0, 0], [2], [-1]):
