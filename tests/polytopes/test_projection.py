@@ -171,12 +171,14 @@ def test_thin_sets_keep_their_width() -> None:
 
 def test_rows_that_floats_cannot_decide_are_settled_once() -> None:
     """Two strips that are nearly one, met in an observer: pruning found the same four rows doubtful again for ever."""
-    rows = [[-1, -0.15566094885653387], [1, 0.15566094885653387], [1, 0.15566096631293783], [-1, -0.15566096631293783]]
-    rhs = [0.1978282179564613, -0.19782821795431732, -0.19782823833005186, 0.1978282383543622]
-    needle, turn = HPolytope(rows, rhs), np.array([[-0.03758921, -0.08368165], [-0.01104815, 0.49828023]])
-    image = needle.affine_map(turn, [-0.11385347, -0.58942963])
+    rows = [[1, 0.15566095022892046], [-1, -0.15566095022892046], [-1, -0.15566094885653387], [1, 0.15566094885653387]]
+    rhs = [-0.19782821955311447, 0.19782821955438643, 0.19782821794751143, -0.19782821794536817]
+    turn = np.array([[-0.03758920653456064, -0.083681646668206], [-0.011048152572234335, 0.498280234073437]])
+    shift = np.array([-0.11385346772013553, -0.5894296268302525])
+    needle = HPolytope(rows, rhs)
+    image = needle.affine_map(turn, shift)
     directions = np.vstack([np.eye(2), -np.eye(2)])
-    expected = needle.support(directions @ turn) + directions @ [-0.11385347, -0.58942963]
+    expected = needle.support(directions @ turn) + directions @ shift
     np.testing.assert_allclose(image.support(directions), expected, atol=1e-6)
 
 
