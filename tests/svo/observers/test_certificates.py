@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo.model import UncertainModel, Uncertainty
@@ -22,12 +21,9 @@ from tests.svo.observers.falsified_windows import (
     falsified,
     put,
     sample_changed,
+    seeds,
 )
 from tests.svo.observers.window_system import judge
-
-SAMPLES, FAULT = 16, 7
-seeds = st.integers(0, 2**32 - 1)
-Forgery = Callable[[np.random.Generator, WindowCertificate, np.ndarray], WindowCertificate]
 
 
 @settings(max_examples=60, deadline=None)

@@ -14,18 +14,16 @@ from hypothesis import strategies as st
 
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
 from tests.svo.observers.falsified_windows import (
+    Forgery,
     arrays_of,
     certificate_of_jump,
     drift,
     falsified,
     put,
+    seeds,
     some_certificates,
 )
 from tests.svo.observers.window_system import judge
-
-SAMPLES, FAULT = 16, 7
-seeds = st.integers(0, 2**32 - 1)
-Forgery = Callable[[np.random.Generator, WindowCertificate, np.ndarray], WindowCertificate]
 
 
 def test_the_random_plants_cover_what_a_model_can_hold() -> None:
