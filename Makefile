@@ -18,8 +18,9 @@ demo: $(VENV)/.study
 test: lint
 	$(BIN)/python -m pytest -n 2
 
+# The long checks, an hour of CPU in named groups (make test-slow GROUPS="soundness polytopes"); a stopped run goes on.
 test-slow: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 -m slow
+	$(BIN)/python -m tests.slow $(GROUPS)
 
 # The report of a study in headless Chromium or Chrome; skipped, with the reason, where there is none.
 test-browser: $(VENV)/.dev
@@ -57,6 +58,7 @@ $(VENV)/.study: pyproject.toml | $(BIN)/python
 $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing what the tests need into $(VENV) (about a minute)"
 	$(PIP) '.[study,cluster,compare,dev]'
+	@$(PIP) '.[cdd]' || echo "No pycddlib for this machine: its tests will be skipped"
 	@touch $@ $(VENV)/.study
 
 $(VENV)/.docs: pyproject.toml | $(BIN)/python
