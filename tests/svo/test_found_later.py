@@ -1,0 +1,217 @@
+"""Faults that are known and not mended yet: each test states what is right, and fails as the mark says.
+
+Marks are strict: whoever mends a point takes its mark away and moves the test to where it belongs. The letter in
+front of each reason is the point of the list of faults found by use.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+import svo
+from polytopes import HPolytope
+from svo import ArchitectureI, PolytopeObserver, UncertainModel, WindowObserver
+from svo.alarms import Alarm
+from svo.log import Log
+from tests.svo.study.test_runner import configuration
+
+FAILED = pytest.fail.Exception  # of pytest.raises
+
+
+def later(point: str, raises: type[BaseException], why: str) -> pytest.MarkDecorator:
+    return pytest.mark.xfail(strict=True, raises=raises, reason=f"{point}: {why}")
+
+
+def cart() -> UncertainModel:
+    return UncertainModel(
+        [[1.0, 0.1], [0.0, 1.0]], [[0.0], [0.1]], [[1.0, 0.0]], E=[[0.0], [0.1]], w=[0.2], n=[0.05], Ts=0.1
+    )
+
+
+def cart_observer() -> WindowObserver:
+    return WindowObserver(cart(), initial=HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
+
+
+# -- the house -------------------------------------------------------------------------------------------------------
+
+
+@later("A11", AssertionError, "a run that alarmed before its fault counts as detected in the elevator's study")
+def test_an_alarm_before_the_fault_is_no_detection() -> None:
+    from svo.interval.study.run import _judge
+
+    alarm = np.zeros(40, dtype=bool)
+    alarm[10:] = True  # before the fault at sample 20, and never gone
+    log = Log(time=0.1 * np.arange(40), u=np.zeros((40, 1)), y=np.zeros((40, 1)))
+    plant: Any = SimpleNamespace(Ts=0.1, fault_time=2.0)
+    job: Any = SimpleNamespace(run=0, seed=0, fault="jam", profile="step", noise="calm")
+    assert _judge(plant, job, log, 1, "detector", alarm, ()).detection_delay_s is None
+
+
+@later("B1", AttributeError, "an alarm of a polytope observer ends the watch that shows it")
+def test_a_watch_shows_the_alarm_of_a_polytope_observer() -> None:
+    from svo.watch.view import alarm_text
+
+    observer = PolytopeObserver(cart(), HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
+    observer.update([0.0])
+    step = observer.step([1.0], [9.0])
+    assert "falsified" in alarm_text(Alarm("nominal", 1, 0.1, step.certificate, {}))
+
+
+@pytest.mark.slow
+@later("B2", AssertionError, "workers of a killed study of the elevator stay for ever")
+def test_workers_of_a_killed_study_end(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "svo", "study", "elevator", "--runs", "60", "--workers", "2", "--out"]
+    process = subprocess.Popen([*command, str(tmp_path / "out")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    workers: list[int] = []
+    end = time.monotonic() + 120.0
+    while len(workers) < 2 and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.1)
+        workers = _workers_of(process.pid)
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 30.0
+    while any(map(_is_alive, workers)) and time.monotonic() < end:
+        time.sleep(0.1)
+    left = [pid for pid in workers if _is_alive(pid)]
+    for pid in left:
+        os.kill(pid, 9)
+    assert len(workers) >= 2
+    assert left == []
+
+
+def _workers_of(parent: int) -> list[int]:
+    found = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    return [int(pid) for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
+    except FileNotFoundError:
+        return False
+
+
+@later("B12", RuntimeError, "one failing run makes a study unfinishable")
+def test_a_study_goes_on_after_a_failing_run(
+    registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from svo.study.runner import run_study
+
+    monkeypatch.setenv("TANK_BURSTS", "1")
+    assert run_study(configuration(registered_tank, runs=1), tmp_path / "out").rows() is not None
+
+
+# -- the native core -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@later("A12", AssertionError, "programs stop at 128 rows of a basis, and a longer window is wider")
+def test_a_longer_window_is_not_wider() -> None:
+    rng = np.random.default_rng(0)
+    n = 50
+    A = rng.normal(size=(n, n))
+    A *= 1.0 / np.abs(np.linalg.eigvals(A)).max()
+    model = UncertainModel(A, None, rng.normal(size=(25, n)), E=np.eye(n), w=np.full(n, 0.1), n=np.full(25, 0.1))
+    start = HPolytope.box(-np.ones(n), np.ones(n))
+    log = model.simulate(np.zeros(n), np.zeros((25, 0)), rng)
+    width = {}
+    for horizon in (5, 10):
+        observer = WindowObserver(model, start, horizon)
+        observer.update(log.y[0])
+        for y in log.y[1:]:
+            box = observer.step([], y).box
+        width[horizon] = float((box[1] - box[0]).max())
+    assert width[10] <= width[5] * (1.0 + 1e-6)
+
+
+@later("B3", (TypeError, ValueError, AttributeError), "a set that was asked something cannot be pickled")
+def test_a_set_that_was_asked_something_can_be_pickled() -> None:
+    P = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
+    P.emptiness(), P.support([1.0, 0.0]), P.vertices()
+    assert pickle.loads(pickle.dumps(P)).contains([0.5, 0.5])
+
+
+@later("B3", TypingError, "observers cannot be copied")
+def test_an_observer_can_be_copied() -> None:
+    observer = cart_observer()
+    observer.update([0.0])
+    assert copy.deepcopy(observer).step([1.0], [0.0]).verdict == observer.step([1.0], [0.0]).verdict
+
+
+@later("B3", (TypeError, ValueError, AttributeError), "steps cannot be pickled")
+def test_a_step_can_be_pickled() -> None:
+    assert pickle.loads(pickle.dumps(cart_observer().update([0.0]))).verdict == "consistent"
+
+
+@later("B3", FAILED, "arrays of a copied set are writeable")
+def test_the_arrays_of_a_copied_set_are_read_only() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        copy.deepcopy(HPolytope.box([-1.0], [1.0])).A[0, 0] = 5.0
+
+
+@pytest.mark.slow
+@later("B4", AssertionError, "another memory layout of y compiles in the middle of a run")
+def test_no_memory_layout_compiles_after_warm_up() -> None:
+    from svo.observers import window_kernel as kernel
+
+    two_gauges = cart().replace(C=np.eye(2), n=[0.05, 0.05])
+    observer = WindowObserver(two_gauges, initial=HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
+    observer.warm_up()
+    observer.update([0.0, 0.0])
+    before = len(kernel.take.signatures)
+    observer.step(np.zeros((2, 3))[:1, 1], np.zeros((2, 3))[:, 1])
+    assert len(kernel.take.signatures) == before
+
+
+# -- the face --------------------------------------------------------------------------------------------------------
+
+
+@later("C", ValueError, "the fourth positional argument of a model is E, not D")
+def test_what_follows_C_is_given_by_name() -> None:
+    with pytest.raises(TypeError):
+        UncertainModel([[1.0]], [[1.0]], [[1.0]], [[1.0]])
+
+
+@later("C", AssertionError, "the main verbs are not to be had from Python")
+@pytest.mark.parametrize("name", ["find_plant", "read_log", "detect", "verify"])
+def test_the_main_verbs_are_functions_of_the_package(name: str) -> None:
+    assert callable(getattr(svo, name, None))
+
+
+@later("C", AttributeError, "a record does not say when its model was falsified")
+def test_a_record_says_when_its_model_was_falsified() -> None:
+    log = cart().simulate([0.0, 0.0], np.zeros((20, 1)), np.random.default_rng(0))
+    log.y[10:] += 1.0
+    assert cart_observer().run(log).falsified_at == 10
+
+
+@later("C", AssertionError, "a record prints itself whole")
+def test_a_record_prints_a_line() -> None:
+    log = cart().simulate([0.0, 0.0], np.zeros((20, 1)), np.random.default_rng(0))
+    assert len(repr(cart_observer().run(log))) < 400
+
+
+@later("C", FAILED, "Architecture I takes a fault that is called as its global model")
+def test_no_fault_is_called_global() -> None:
+    with pytest.raises(ValueError, match="global"):
+        ArchitectureI(cart_observer(), {"global": cart_observer()})
+
+
+@later("C", AssertionError, "listing the plants imports scipy.signal")
+def test_listing_the_plants_imports_no_scipy_signal() -> None:
+    list_plants = "import sys; from svo.cli import app; app(['plants'], standalone_mode=False)"
+    code = f"{list_plants}; print('scipy.signal' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"
