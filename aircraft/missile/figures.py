@@ -11,10 +11,12 @@ from aircraft.missile.adaptive import ModelError
 from aircraft.missile.imu import NOISE_SETS
 from aircraft.missile.redundancy import ETA, RESIDUALS, residuals
 from aircraft.missile.scenarios import DURATION, SCENARIOS, TS, Flights, Run, Scenario
+from svo.store import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLOURS = ("#111111", "#0072B2", "#009E73", "#CC79A7")
 TARGET, BOUND, FAULT = "#D55E00", "#D55E00", "#5B6470"
@@ -30,7 +32,7 @@ def write_figures(folder: Path, flights: Flights, seed: int, noise: str = "gauss
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     plot_trajectories(flights, seed, noise, figure.add_subplot(projection="3d"))
     written["Trajectories (Fig. 3)"] = folder / "trajectories.png"
-    figure.savefig(written["Trajectories (Fig. 3)"], dpi=DPI)
+    _save(written["Trajectories (Fig. 3)"], figure)
     for number, scenario in SCENARIOS.items():
         run = flights.run(scenario.faults, NOISE_SETS[noise], seed)
         figure = Figure(figsize=(8.0, 1.9 * len(scenario.shown) + 0.4), layout="constrained")
@@ -42,8 +44,12 @@ def write_figures(folder: Path, flights: Flights, seed: int, noise: str = "gauss
         figure.legend(handles, labels, loc="outside upper left", ncols=len(handles), frameon=False)
         title = f"Residuals of scenario {number} (Fig. {number + 3})"
         written[title] = folder / f"scenario_{number}.png"
-        figure.savefig(written[title], dpi=DPI)
+        _save(written[title], figure)
     return written
+
+
+def _save(path: Path, figure: Figure) -> None:
+    write_whole(path, lambda file: figure.savefig(file, dpi=DPI))
 
 
 def plot_trajectories(flights: Flights, seed: int, noise: str, ax: Axes) -> list[Artist]:

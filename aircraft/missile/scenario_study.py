@@ -7,9 +7,8 @@ that gives the alarm: the two samples of the IMU's delay are in them.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +22,7 @@ from aircraft.missile.isolability import isolability_table
 from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
 from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scenario, locked, noise_set, thrust_loss
 from aircraft.missile.sequence import isolate_in_order
+from svo.store import write_csv, write_text
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -101,11 +101,8 @@ class ScenarioStudy:
     def write(self, folder: Path) -> None:
         """scenario_residuals.csv, scenario_orders.csv and scenarios.txt."""
         for name, rows in (("residuals", self.residuals), ("orders", self.orders)):
-            with (folder / f"scenario_{name}.csv").open("w", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, [f.name for f in fields(rows[0])], lineterminator="\n")
-                writer.writeheader()
-                writer.writerows(asdict(row) for row in rows)
-        (folder / "scenarios.txt").write_text(self.to_text() + "\n", encoding="utf-8")
+            write_csv(folder / f"scenario_{name}.csv", [asdict(row) for row in rows])
+        write_text(folder / "scenarios.txt", self.to_text() + "\n")
 
 
 def run_study(runs: int, seed: int, noises: Sequence[str], flights: Flights | None = None) -> ScenarioStudy:

@@ -108,7 +108,8 @@ def study(
         configuration = StudyConfiguration.for_plant(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
         )
-        StudyFolder(out).check(configuration, resume)
+        for line in StudyFolder(out).check(configuration, resume):
+            typer.echo(f"note: {line}", err=True)
         if isinstance(the_plant, LearnsDetectors):
             _study_detectors(the_plant, configuration, out, workers, scheduler, resume, as_json)
             return
@@ -133,8 +134,13 @@ def report(
         Path,
         typer.Argument(metavar="DIR", callback=writable_folder, help="Folder of a study, finished or still running."),
     ],
+    without_damaged: Annotated[
+        bool, typer.Option("--without-damaged", help="Leave out parts of the study that are damaged, and name them.")
+    ] = False,
 ) -> None:
     """Write summary.csv, pictures and report.html of a study from the runs that it has so far.
+
+    A part of the study that is damaged is an error that names it, unless --without-damaged leaves it out.
 
     \b
     Example:
@@ -150,12 +156,12 @@ def report(
 
         study = StudyFolder(folder)
         the_plant = load_plant(study.identity()["configuration"]["plant"])
-        if not any(study.parts.glob("run-*.parquet")):
-            raise ValueError(f"{folder} holds no finished run yet; its report needs one")
         if isinstance(the_plant, LearnsDetectors):
-            publish_detectors(study, the_plant)
+            publish_detectors(study, the_plant, without_damaged)
         else:
-            publish(study, the_plant)
+            publish(study, the_plant, without_damaged)
+        for line in study.notes():
+            typer.echo(f"note: {line}", err=True)
         typer.echo(f"Report: {folder / 'report.html'}")
 
 

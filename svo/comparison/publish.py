@@ -11,6 +11,7 @@ from svo.comparison.table import ComparisonRow, comparison_table, write_runs, wr
 from svo.interval.study.run import LearnsDetectors
 from svo.interval.study.run_figures import write_run_figures
 from svo.plant import Plant, fault_start
+from svo.store import write_whole
 
 
 def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[ComparisonRow]:
@@ -28,7 +29,7 @@ def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[Comp
     scenarios = {(row.fault, row.profile) for row in rows}
     longest = max(_seconds_after(plant, *scenario, compared.comparison.noise) for scenario in scenarios)
     figure = plot_comparison(rows, compared.comparison.rate, plant.Ts, longest)
-    figure.savefig(out / "comparison.png", dpi=130)
+    write_whole(out / "comparison.png", lambda file: figure.savefig(file, dpi=130))
     if isinstance(plant, LearnsDetectors):
         write_run_figures(out, plant, compared.comparison.noise, compared.comparison.seed)
     return rows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -16,6 +15,7 @@ from svo.comparison.detector import Kind
 from svo.comparison.run import ComparedRun
 from svo.comparison.tuning import Tuned
 from svo.plant import HEALTHY
+from svo.store import write_csv
 from svo.study.summary import Delays, Share
 
 
@@ -103,12 +103,12 @@ def comparison_table(compared: Compared) -> list[ComparisonRow]:
 
 def write_table(path: Path, rows: Sequence[ComparisonRow]) -> None:
     """Write the table as CSV; what does not exist is left empty."""
-    _write(path, [row.to_dict() for row in rows])
+    write_csv(path, [row.to_dict() for row in rows])
 
 
 def write_runs(path: Path, runs: Iterable[ComparedRun]) -> None:
     """Write every judged run as CSV."""
-    _write(path, [asdict(run) for run in runs], [field.name for field in fields(ComparedRun)])
+    write_csv(path, [asdict(run) for run in runs], [field.name for field in fields(ComparedRun)])
 
 
 def _row(
@@ -147,10 +147,3 @@ def _times(name: str, delays: Delays) -> dict[str, Any]:
         f"{name}_p05_s": delays.p05,
         f"{name}_p95_s": delays.p95,
     }
-
-
-def _write(path: Path, rows: Sequence[dict[str, Any]], names: Sequence[str] | None = None) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(names or rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from itertools import product
@@ -118,6 +118,25 @@ class StudyConfiguration:
         chosen = tuple(architectures) or (() if own is None else (own,))
         return cls(plant=plant.name, noise=noise, faults=faults, runs=runs, seed=seed, architectures=chosen)
 
+    @classmethod
+    def from_dict(cls, stored: Mapping[str, Any]) -> StudyConfiguration:
+        """What `to_dict` gave.
+
+        Raises
+        ------
+        ValueError
+            Naming the key that is missing, unknown, or has a value of another kind.
+        """
+        known = {f.name: f.type for f in fields(cls)}
+        missing, unknown = sorted(known.keys() - stored.keys()), sorted(stored.keys() - known.keys())
+        if missing or unknown:
+            what = f"lacks {missing[0]!r}" if missing else f"has the unknown key {unknown[0]!r}"
+            raise ValueError(f"the configuration {what}; expected {', '.join(known)}")
+        for name, kind in known.items():
+            _check_kind(name, stored[name], str(kind))
+        given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in stored.items()}
+        return cls(**given)
+
     def jobs(self, plant: Plant) -> list[Job]:
         """The runs in their order.
 
@@ -142,6 +161,17 @@ class StudyConfiguration:
     def to_dict(self) -> dict[str, Any]:
         """A form for JSON; lists instead of tuples."""
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+
+def _check_kind(name: str, value: Any, kind: str) -> None:
+    right = {
+        "str": isinstance(value, str),
+        "int": isinstance(value, int) and not isinstance(value, bool),
+        "tuple[str, ...]": isinstance(value, list) and all(isinstance(v, str) for v in value),
+    }
+    if not right[kind]:
+        expected = {"str": "a text", "int": "an integer"}.get(kind, "a list of texts")
+        raise ValueError(f"{name} of the configuration is {value!r:.100}; expected {expected}")
 
 
 def conditions(plant: Plant) -> list[tuple[str, str]]:

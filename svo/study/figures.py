@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from svo.plant import HEALTHY, Plant, fault_start
+from svo.store import file_name, write_whole
 from svo.study import plots
 from svo.study.exemplar import Exemplar
 from svo.study.summary import ConditionSummary
@@ -64,19 +65,19 @@ def _pictures(
         title = f"Times to detect and to isolate, {noise} noise"
         banks = architectures(chosen)
         draw = _delays if len(banks) == 1 else _architectures
-        yield _save(folder / f"delays_{noise}.png", draw(plant, chosen), title, text)
+        yield save_picture(folder / f"delays_{file_name(noise)}.png", draw(plant, chosen), title, text)
         for bank in banks:
             shown = [e for e in exemplars if (e.noise, e.architecture) == (noise, bank) and e.fault != HEALTHY]
             several = len(banks) > 1
             where = f"{noise} noise" + (f", Architecture {bank}" if several else "")
-            yield from _of_runs(folder, plant, shown, where, f"{noise}_{bank}" if several else noise)
+            yield from _of_runs(folder, plant, shown, where, file_name(f"{noise}_{bank}" if several else noise))
 
 
 def _of_runs(folder: Path, plant: Plant, shown: Sequence[Exemplar], where: str, suffix: str) -> Iterator[Picture]:
     """The pictures of exemplary runs of one bank with one noise set."""
     title = f"Models alive over time, {where}"
     text = "One run of each fault and profile. A bar ends where the model is falsified, with the delay beside it."
-    yield _save(folder / f"alive_{suffix}.png", _alive(plant, shown), title, text)
+    yield save_picture(folder / f"alive_{suffix}.png", _alive(plant, shown), title, text)
     slow = _slowest(shown)
     if slow[0].x.shape[1] > 1:
         title = f"Sets of the models and the true state, {where}"
@@ -85,10 +86,10 @@ def _of_runs(folder: Path, plant: Plant, shown: Sequence[Exemplar], where: str, 
             "of each fault, at the last samples before models are falsified. The cross is the true state; a model "
             "is falsified when its set becomes empty."
         )
-        yield _save(folder / f"sets_{suffix}.png", _sets(plant, slow), title, text)
+        yield save_picture(folder / f"sets_{suffix}.png", _sets(plant, slow), title, text)
     title = f"Bounds and true state, {where}"
     text = "The same runs: what the nominal model (until it is falsified) and the true fault's model allow."
-    yield _save(folder / f"bounds_{suffix}.png", _bounds(plant, slow), title, text)
+    yield save_picture(folder / f"bounds_{suffix}.png", _bounds(plant, slow), title, text)
 
 
 def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
@@ -208,8 +209,9 @@ def _figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def _save(path: Path, figure: Figure, title: str, caption: str) -> Picture:
-    figure.savefig(path, dpi=DPI)
+def save_picture(path: Path, figure: Figure, title: str, caption: str) -> Picture:
+    """Write a figure as a PNG file, whole or not at all."""
+    write_whole(path, lambda file: figure.savefig(file, dpi=DPI))
     return Picture(path, title, caption)
 
 

@@ -10,9 +10,15 @@ from svo.study.store import StudyFolder
 from svo.study.summary import ConditionSummary, summarise, write_summary
 
 
-def publish(folder: StudyFolder, plant: Plant) -> list[ConditionSummary]:
-    """Write summary.csv, the pictures and report.html into the study's folder; returns the summaries."""
-    rows, exemplars = folder.rows(), list(folder.exemplars())
+def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) -> list[ConditionSummary]:
+    """Write summary.csv, the pictures and report.html into the study's folder; returns the summaries.
+
+    Raises
+    ------
+    ValueError
+        If parts of the study are damaged, unless these are to be left out.
+    """
+    rows, exemplars = folder.rows(without_damaged), folder.exemplars(without_damaged)
     summaries = summarise(rows)
     write_summary(folder.path / "summary.csv", summaries)
     pictures = write_pictures(folder.path, plant, summaries, exemplars)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from svo.plant import HEALTHY, Plant
+from svo.store import write_text
 from svo.study import tables
 from svo.study.figures import Picture
 from svo.study.summary import ConditionSummary
@@ -85,7 +86,7 @@ def write_report(
 def write_page(path: Path, title: str, parts: Iterable[str]) -> None:
     """Write pieces of HTML as one page with the reports' style inside."""
     style = files("svo.study").joinpath("report.css").read_text(encoding="utf-8")
-    path.write_text(_PAGE.format(title=escape(title), style=style, body="\n".join(parts)), encoding="utf-8")
+    write_text(path, _PAGE.format(title=escape(title), style=style, body="\n".join(parts)))
 
 
 _PAGE = """<!doctype html>

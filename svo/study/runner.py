@@ -66,15 +66,15 @@ def run_study(
         raise ValueError(f"workers is {workers}; expected at least 1 process")
     folder = StudyFolder(Path(out))
     jobs = configuration.jobs(registered_plant(configuration.plant))
-    done = folder.open(configuration, resume)
-    to_do = [job for job in jobs if job.run not in done]
-    if progress is not None:
-        progress(len(jobs) - len(to_do), len(jobs))
-    finished = _finished(configuration, folder, to_do, workers, scheduler)
-    for count, _ in enumerate(finished, start=len(jobs) - len(to_do) + 1):
+    with folder.open(configuration, [job.run for job in jobs], resume) as done:
+        to_do = [job for job in jobs if job.run not in done]
         if progress is not None:
-            progress(count, len(jobs))
-    folder.join_alarms()
+            progress(len(jobs) - len(to_do), len(jobs))
+        finished = _finished(configuration, folder, to_do, workers, scheduler)
+        for count, _ in enumerate(finished, start=len(jobs) - len(to_do) + 1):
+            if progress is not None:
+                progress(count, len(jobs))
+        folder.join_alarms()
     return folder
 
 

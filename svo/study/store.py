@@ -1,49 +1,40 @@
-"""The folder of a study: part files that survive a kill, and the table, alarms and samples read back.
+"""The folder of a study: its identity, the parts of its table, its alarms and exemplary runs.
 
-A run is done when its part of ``runs.parquet`` stands; that part is written last, and every file appears whole or
-not at all (written under another name, then renamed).
+A run is done when its part of ``runs.parquet`` stands: it is written last, after its alarms and samples, whose
+digests it holds. Parts that are damaged, copied, or of another study are found by their seals (`svo.store`).
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-import os
-import shutil
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Generic
 
 from svo.alarms import write_alarms
+from svo.store import Joined, Parts, Survey, digest_of, locked, write_text, write_whole
+from svo.store.lock import check_free
+from svo.store.parts import Row, part_name
 from svo.study.configuration import StudyConfiguration, versions
 from svo.study.exemplar import Exemplar
 from svo.study.run import RunOutcome, RunRow
 
-_TYPES = {
-    "run": "int64",
-    "seed": "int64",
-    "fault": "string",
-    "profile": "string",
-    "noise": "string",
-    "first_alarm_s": "float64",
-    "detection_delay_s": "float64",
-    "isolation_delay_s": "float64",
-    "isolated_as": "string",
-    "false_alarm": "bool",
-    "wrong_isolation": "bool",
-    "alive_end": "string",
-    "microseconds_per_step": "float64",
-    "microseconds_p99": "float64",
-    "undecided": "int64",
-    "architecture": "string",
-}
+FORMAT = "svo-study-2"
+_ALARMS, _EXEMPLAR = "alarms", "exemplar"  # what belongs to a run beside its rows
+_NOT_COMPARED = "machine"
+_LARGEST_IDENTITY = 1_000_000  # bytes
+_SHOWN = 5
 
 
 @dataclass(frozen=True)
-class StudyFolder:
-    """Where a study keeps its files."""
+class StudyStore(Generic[Row]):
+    """Where a study keeps its files; a subclass names the dataclass of its rows."""
 
     path: Path
+    row: ClassVar[type[Any]]
 
     @property
     def parts(self) -> Path:
@@ -53,69 +44,95 @@ class StudyFolder:
     def alarms(self) -> Path:
         return self.path / "alarms.jsonl"
 
-    def check(self, configuration: StudyConfiguration, resume: bool) -> None:
-        """Raise an error if the study cannot be run into this folder.
+    def check(self, configuration: StudyConfiguration, resume: bool) -> list[str]:
+        """Raise an error if the study cannot be run into this folder; returns what a user should know about it.
 
         Raises
         ------
         ValueError
-            If the folder is not empty and ``resume`` is False, or holds something else than this very study
-            (configuration and versions of the software).
+            If the folder is not empty and ``resume`` is False, holds something else than this very study
+            (configuration and versions of the software), another process is at work in it, or its ``alarms.jsonl``
+            is not what the study wrote.
         """
-        if self.path.exists() and any(self.path.iterdir()):
-            if not resume:
-                raise ValueError(
-                    f"{self.path} is not empty; give --resume to go on with the study in it, or another folder"
-                )
-            self._check_same(configuration)
+        if not self.path.is_dir():
+            return []
+        check_free(self.path)
+        return self._check_content(configuration, resume)
 
-    def open(self, configuration: StudyConfiguration, resume: bool) -> set[int]:
-        """Make the folder ready and return the numbers of the runs that it already holds; raises as `check`."""
+    @contextmanager
+    def open(self, configuration: StudyConfiguration, runs: Collection[int], resume: bool) -> Iterator[set[int]]:
+        """Make the folder ready, keep other processes out of it, and give those of the runs that it holds already.
+
+        Raises
+        ------
+        ValueError
+            As `check`.
+        """
         self.check(configuration, resume)
         self.path.mkdir(parents=True, exist_ok=True)
-        if not self._identity.exists():
-            text = json.dumps({"configuration": configuration.to_dict(), "versions": versions()}, indent=2) + "\n"
-            write_whole(self._identity, lambda file: file.write_text(text, encoding="utf-8"))
-        for part in (self.parts, self._alarm_parts, self._exemplars):
-            part.mkdir(exist_ok=True)
-            for unfinished in part.glob(".*"):
-                unfinished.unlink()
-        return {int(part.stem.removeprefix("run-")) for part in self.parts.glob("run-*.parquet")}
+        with locked(self.path):
+            self._check_content(configuration, resume)
+            if not self._identity.exists():
+                write_text(self._identity, json.dumps(_identity(configuration), indent=2) + "\n")
+            self._parts().make()
+            self._joined.make()
+            self._exemplars.mkdir(exist_ok=True)
+            seals = self._survey().intact
+            lost = self._joined.missing(_digests(seals, _ALARMS))
+            samples = _digests(seals, _EXEMPLAR)
+            lost |= {run for run, digest in samples.items() if not _is_intact(self._exemplar(run), digest)}
+            done = {run for run in runs if run in seals and run not in lost}
+            if len(done) < len(runs):
+                self._joined.take_apart({run: d for run, d in _digests(seals, _ALARMS).items() if run in done})
+            yield done
 
-    def write(self, outcome: RunOutcome, configuration: StudyConfiguration) -> None:
-        """Store a run; its part of the table comes last."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        name = f"run-{outcome.row.run:06d}"
-        if outcome.alarms:
-            write_whole(self._alarm_parts / f"{name}.jsonl", lambda file: write_alarms(file, outcome.alarms))
-        if outcome.exemplar is not None:
-            write_whole(self._exemplars / f"{name}.npz", outcome.exemplar.save)
+    def store(
+        self,
+        run: int,
+        rows: list[Row],
+        configuration: StudyConfiguration,
+        attached: Mapping[str, tuple[Path, Callable[[Path], Any]]] | None = None,
+    ) -> None:
+        """Store a run: the files that belong to it, and last its part of the table."""
+        digests = {}
+        for kind, (path, write) in (attached or {}).items():
+            write_whole(path, write)
+            digests[kind] = digest_of(path)
         metadata = {"svo.configuration": json.dumps(configuration.to_dict()), "svo.versions": json.dumps(versions())}
-        schema = pa.schema([(key, pa.type_for_alias(kind)) for key, kind in _TYPES.items()], metadata=metadata)
-        table = pa.Table.from_pylist([asdict(outcome.row)], schema=schema)
-        write_whole(self.parts / f"{name}.parquet", lambda file: pq.write_table(table, file))
+        self._parts(_identity(configuration)).write(run, rows, digests, metadata)
 
     def join_alarms(self) -> None:
-        """Make one ``alarms.jsonl`` of the runs' alarms, in the order of the runs."""
-        if not self._alarm_parts.exists():
-            return
-        if not self.alarms.exists():  # else a kill came between joining and removing
-            parts = sorted(self._alarm_parts.glob("run-*.jsonl"))
-            write_whole(self.alarms, lambda file: _concatenate(parts, file))
-        shutil.rmtree(self._alarm_parts)
+        """Make one ``alarms.jsonl`` of the runs' alarms, in the order of the runs; errors as `check`."""
+        self._joined.join(_digests(self._survey().intact, _ALARMS))
 
-    def rows(self) -> list[RunRow]:
-        """The run table, in the order of the runs."""
-        import pyarrow.parquet as pq
+    def rows(self, without_damaged: bool = False) -> list[Row]:
+        """The run table, in the order of the runs.
 
-        table = pq.read_table(self.parts, columns=list(_TYPES))
-        return sorted((RunRow(**row) for row in table.to_pylist()), key=lambda row: row.run)
+        Raises
+        ------
+        ValueError
+            If there is no intact part, or if parts are damaged, unless these are to be left out.
+        """
+        survey = self._survey()
+        if survey.damaged and not without_damaged:
+            raise self._damaged([f"{self._parts().path(run)}: {why}" for run, why in survey.damaged.items()])
+        if not survey.intact:
+            raise ValueError(f"{self.path} holds no finished run yet; its report needs one")
+        return self._parts().rows(sorted(survey.intact))
 
-    def exemplars(self) -> Iterable[Exemplar]:
-        """The exemplary runs, one after the other."""
-        return (Exemplar.load(path) for path in sorted(self._exemplars.glob("run-*.npz")))
+    def exemplars(self, without_damaged: bool = False) -> list[Exemplar]:
+        """The exemplary runs; errors as `rows`."""
+        samples = sorted(_digests(self._survey().intact, _EXEMPLAR).items())
+        bad = [run for run, digest in samples if not _is_intact(self._exemplar(run), digest)]
+        if bad and not without_damaged:
+            raise self._damaged([f"{self._exemplar(run)}: missing, or its checksum does not match" for run in bad])
+        return [Exemplar.load(self._exemplar(run)) for run, _ in samples if run not in bad]
+
+    def notes(self) -> list[str]:
+        """What a reader of the folder's results should know about it: what is damaged, and what is ignored."""
+        survey = self._survey()
+        left = [f"{self._parts().path(run)}: {why}; left out" for run, why in survey.damaged.items()]
+        return left + _strays(survey)
 
     def identity(self) -> dict[str, Any]:
         """Configuration and versions, as stored.
@@ -123,26 +140,70 @@ class StudyFolder:
         Raises
         ------
         ValueError
-            If the folder has no ``study.json``, or not that of a study.
+            If the folder has no ``study.json``, or not that of a study of this version.
         """
-        if not self._identity.exists():
+        if not self._identity.is_file():
             raise ValueError(f"{self.path} holds no study (study.json is missing); expected a folder of svo study")
-        stored = json.loads(self._identity.read_text(encoding="utf-8"))
+        if self._identity.stat().st_size > _LARGEST_IDENTITY:
+            raise ValueError(f"{self._identity} is not that of a study; it has more than {_LARGEST_IDENTITY} bytes")
+        try:
+            stored = json.loads(self._identity.read_text(encoding="utf-8"))
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"{self._identity} is not that of a study; it is no JSON ({error})") from error
         if not (isinstance(stored, dict) and isinstance(stored.get("configuration"), dict)):
             raise ValueError(f"{self._identity} is not that of a study; expected an object with a configuration")
+        if stored.get("format") != FORMAT:
+            raise ValueError(
+                f"{self._identity} has the format {stored.get('format')!r}, that of another version of svo; expected "
+                f"{FORMAT!r}, so run the study anew into another folder"
+            )
+        try:
+            StudyConfiguration.from_dict(stored["configuration"])
+            _check_versions(stored.get("versions"))
+        except ValueError as error:
+            raise ValueError(f"{self._identity} is not that of a study: {error}") from error
         return stored
+
+    def _survey(self) -> Survey:
+        return self._parts().survey()
+
+    def _parts(self, identity: Mapping[str, Any] | None = None) -> Parts[Row]:
+        return Parts(self.parts, self.row, _digest(self.identity() if identity is None else identity))
+
+    @property
+    def _joined(self) -> Joined:
+        return Joined(self.alarms, self.path / "alarms", lambda line: int(json.loads(line)["source"]["run"]))
 
     @property
     def _identity(self) -> Path:
         return self.path / "study.json"
 
     @property
-    def _alarm_parts(self) -> Path:
-        return self.path / "alarms"
-
-    @property
     def _exemplars(self) -> Path:
         return self.path / "exemplars"
+
+    def _exemplar(self, run: int) -> Path:
+        return self._exemplars / f"{part_name(run)}.npz"
+
+    def _damaged(self, lines: list[str]) -> ValueError:
+        more = f"; and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
+        return ValueError(
+            f"{'; '.join(lines[:_SHOWN])}{more}. `svo study ... --resume` computes what is damaged again; "
+            f"`svo report {self.path} --without-damaged` goes on without it"
+        )
+
+    def _check_content(self, configuration: StudyConfiguration, resume: bool) -> list[str]:
+        if all(entry.name.startswith(".") for entry in self.path.iterdir()):
+            return []
+        if not resume:
+            raise ValueError(
+                f"{self.path} is not empty; give --resume to go on with the study in it, or another folder"
+            )
+        self._check_same(configuration)
+        self._joined.check()
+        survey = self._survey()
+        again = [f"{self._parts().path(run)}: {why}; run {run} is done again" for run, why in survey.damaged.items()]
+        return again + _strays(survey)
 
     def _check_same(self, configuration: StudyConfiguration) -> None:
         if not self._identity.exists():
@@ -155,7 +216,7 @@ class StudyFolder:
         different = [
             f"{key} was {was.get(key)!r}, now {now[key]!r}"
             for key in now
-            if key != "machine" and was.get(key) != now[key]
+            if key != _NOT_COMPARED and was.get(key) != now[key]
         ]
         if different:
             raise ValueError(
@@ -164,14 +225,47 @@ class StudyFolder:
             )
 
 
-def write_whole(path: Path, write: Callable[[Path], Any]) -> None:
-    """Write a file under another name, then rename it: it appears whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    write(temporary)
-    temporary.replace(path)
+@dataclass(frozen=True)
+class StudyFolder(StudyStore[RunRow]):
+    """The folder of a study of isolation times."""
+
+    row = RunRow
+
+    def write(self, outcome: RunOutcome, configuration: StudyConfiguration) -> None:
+        """Store a run; its part of the table comes last."""
+        run, exemplar = outcome.row.run, outcome.exemplar
+        attached: dict[str, tuple[Path, Callable[[Path], Any]]] = {}
+        if outcome.alarms:
+            attached[_ALARMS] = (self._joined.part(run), lambda file: write_alarms(file, outcome.alarms))
+        if exemplar is not None:
+            attached[_EXEMPLAR] = (self._exemplar(run), exemplar.save)
+        self.store(run, [outcome.row], configuration, attached)
 
 
-def _concatenate(parts: list[Path], target: Path) -> None:
-    with target.open("wb") as out:
-        for part in parts:
-            out.write(part.read_bytes())
+def _identity(configuration: StudyConfiguration) -> dict[str, Any]:
+    return {"format": FORMAT, "configuration": configuration.to_dict(), "versions": versions()}
+
+
+def _digest(identity: Mapping[str, Any]) -> str:
+    """What all parts of a study agree on, on any machine."""
+    software = {name: version for name, version in identity["versions"].items() if name != _NOT_COMPARED}
+    text = json.dumps([identity["format"], identity["configuration"], software], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _check_versions(versions: Any) -> None:
+    if not (isinstance(versions, dict) and all(isinstance(value, str) for value in versions.values())):
+        raise ValueError("versions is no object of texts")
+
+
+def _digests(seals: Mapping[int, Any], kind: str) -> dict[int, str]:
+    return {run: seal.attached[kind] for run, seal in seals.items() if kind in seal.attached}
+
+
+def _is_intact(path: Path, digest: str) -> bool:
+    return path.is_file() and digest_of(path) == digest
+
+
+def _strays(survey: Survey) -> list[str]:
+    every = [f"{path} is {why}; ignored" for path, why in survey.strays.items()]
+    return every[:_SHOWN] + ([f"{len(every) - _SHOWN} more files that are ignored"] if len(every) > _SHOWN else [])

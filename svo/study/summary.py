@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -13,6 +12,7 @@ import numpy as np
 from scipy import stats
 
 from svo.plant import HEALTHY
+from svo.store import write_csv
 from svo.study.run import RunRow
 
 CONFIDENCE = 0.95
@@ -113,11 +113,7 @@ def summarise(rows: Iterable[RunRow]) -> list[ConditionSummary]:
 
 def write_summary(path: Path, summaries: Iterable[ConditionSummary]) -> None:
     """Write summaries as CSV, one row a condition; what does not exist is left empty."""
-    rows = [_flat(summary) for summary in summaries]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write_csv(path, [_flat(summary) for summary in summaries])
 
 
 def to_json(summaries: Iterable[ConditionSummary]) -> list[dict[str, Any]]:

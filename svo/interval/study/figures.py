@@ -11,7 +11,8 @@ import numpy as np
 from svo.interval.study.run import LearnsDetectors
 from svo.interval.study.summary import AssumptionSummary, DetectorSummary
 from svo.plant import HEALTHY
-from svo.study.figures import DPI, STYLE, Picture
+from svo.store import file_name
+from svo.study.figures import STYLE, Picture, save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,12 +49,14 @@ def _pictures(
                 "Points: median; lines: 5–95 % of the runs, none where it is infinite. Diamonds: the paper's Table 1."
             )
             figure = _times(plant, chosen)
-            yield _save(folder / f"detection_times_{noise}.png", figure, f"Detection times, {noise} noise", text)
+            path = folder / f"detection_times_{file_name(noise)}.png"
+            yield save_picture(path, figure, f"Detection times, {noise} noise", text)
         checked = [s for s in assumption if s.noise == noise]
         if checked:
             text = "Share of fault-free runs whose moving average over q samples exceeds the learnt bound."
             title = f"Where assumption (7) fails, {noise} noise"
-            yield _save(folder / f"assumption_{noise}.png", _assumption(checked, windows), title, text)
+            path = folder / f"assumption_{file_name(noise)}.png"
+            yield save_picture(path, _assumption(checked, windows), title, text)
 
 
 def _times(plant: LearnsDetectors, summaries: Sequence[DetectorSummary]) -> Figure:
@@ -114,8 +117,3 @@ def _assumption(summaries: Sequence[AssumptionSummary], windows: int) -> Figure:
     ax.set_ylim(bottom=0)
     ax.legend()
     return figure
-
-
-def _save(path: Path, figure: Figure, title: str, caption: str) -> Picture:
-    figure.savefig(path, dpi=DPI)
-    return Picture(path, title, caption)

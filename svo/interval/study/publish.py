@@ -22,7 +22,7 @@ from svo.interval.study.summary import (
 from svo.plant import HEALTHY
 from svo.study.figures import Picture
 from svo.study.report import html_facts, html_figure, html_table, write_page
-from svo.study.store import StudyFolder
+from svo.study.store import StudyStore
 from svo.study.summary import Share
 from svo.study.tables import TextTable
 
@@ -64,9 +64,9 @@ class DetectionStudy:
         }
 
 
-def publish(folder: StudyFolder, plant: LearnsDetectors) -> DetectionStudy:
-    """Write summary.csv, the pictures and report.html into the study's folder."""
-    rows = read_rows(folder)
+def publish(folder: StudyStore[Any], plant: LearnsDetectors, without_damaged: bool = False) -> DetectionStudy:
+    """Write summary.csv, the pictures and report.html into the study's folder; errors as `StudyStore.rows`."""
+    rows = read_rows(folder, without_damaged)
     summaries, assumption = summarise(plant, rows), summarise_assumption(rows)
     write_summary(folder.path / "summary.csv", summaries)
     windows = max((q for s in assumption for q in s.by_window), default=1)

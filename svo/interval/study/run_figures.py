@@ -10,7 +10,7 @@ import numpy as np
 from svo.interval.detector import IntervalRecord
 from svo.interval.study.run import LearnsDetectors
 from svo.plant import HEALTHY, fault_start
-from svo.study.figures import DPI, STYLE, Picture
+from svo.study.figures import STYLE, Picture, save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +72,7 @@ def _figure_3(folder: Path, record: IntervalRecord) -> Picture:
     bottom.set_ylabel("radius [mrad]")
     bottom.set_xlabel("time [s]")
     text = "As Figure 3 of the paper: the radius grows while the surface moves, and vanishes at rest."
-    return _save(folder / "run_healthy.png", figure, "Fault-free run", text)
+    return save_picture(folder / "run_healthy.png", figure, "Fault-free run", text)
 
 
 def _figure_4(folder: Path, record: IntervalRecord) -> Picture:
@@ -91,7 +91,7 @@ def _figure_4(folder: Path, record: IntervalRecord) -> Picture:
         ax.set_ylabel("position [rad]")
     figure.axes[0].legend()
     text = "As Figure 4: the same run where the radius is largest, and where it is smallest."
-    return _save(folder / "run_zoom.png", figure, "Zoom of the fault-free run", text)
+    return save_picture(folder / "run_zoom.png", figure, "Zoom of the fault-free run", text)
 
 
 def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Picture:
@@ -117,15 +117,10 @@ def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Pi
     handles, labels = figure.axes[1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     text = "As Figure 5: the whole run, and the time from fault to alarm (pole of the last filter but one)."
-    return _save(folder / "run_faults.png", figure, "Runs with faults", text)
+    return save_picture(folder / "run_faults.png", figure, "Runs with faults", text)
 
 
 def _figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
-
-
-def _save(path: Path, figure: Figure, title: str, caption: str) -> Picture:
-    figure.savefig(path, dpi=DPI)
-    return Picture(path, title, caption)

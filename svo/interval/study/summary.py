@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from svo.interval.study.run import DetectorRow, LearnsDetectors
 from svo.plant import HEALTHY, fault_start
+from svo.store import write_csv
 from svo.study.summary import Delays, Share
 
 _HEADER = (
@@ -113,11 +113,10 @@ def summarise_assumption(rows: Iterable[DetectorRow]) -> list[AssumptionSummary]
 
 def write_summary(path: Path, summaries: Sequence[DetectorSummary]) -> None:
     """Write summaries as CSV, one row a detector and condition; what does not exist is left empty."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_HEADER)
-        for s in summaries:
-            times = [s.time_of(d) for d in (s.detect.median, s.detect.p05, s.detect.p95)]
-            share = [s.false_alarms.count, s.false_alarms.value, *s.false_alarms.interval]
-            row = [s.noise, s.fault, s.profile, s.records, s.detector, s.detect.reached.of, s.detect.reached.count]
-            writer.writerow([*row, *times, s.paper, *share])
+    rows = []
+    for s in summaries:
+        times = [s.time_of(d) for d in (s.detect.median, s.detect.p05, s.detect.p95)]
+        share = [s.false_alarms.count, s.false_alarms.value, *s.false_alarms.interval]
+        row = [s.noise, s.fault, s.profile, s.records, s.detector, s.detect.reached.of, s.detect.reached.count]
+        rows.append(dict(zip(_HEADER, [*row, *times, s.paper, *share], strict=True)))
+    write_csv(path, rows, _HEADER)

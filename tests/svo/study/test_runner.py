@@ -58,7 +58,7 @@ def test_a_killed_study_goes_on_where_it_was(registered_tank: str, tmp_path: Pat
     whole = run_study(wanted, tmp_path / "whole")
     assert untimed(resumed.rows()) == untimed(whole.rows())
     assert resumed.alarms.read_bytes() == whole.alarms.read_bytes()
-    assert not list(tmp_path.rglob(".run-*"))
+    assert not list(tmp_path.rglob(".unfinished-*"))
 
 
 def test_an_interruption_from_the_keyboard_keeps_what_is_done(registered_tank: str, tmp_path: Path) -> None:
