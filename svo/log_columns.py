@@ -28,6 +28,10 @@ Place = Callable[[int], str]
 TIME_TOLERANCE = 0.01
 
 
+class LogNote(UserWarning):
+    """Something in a log that was read in a way its reader should know of; the command line prints it as a note."""
+
+
 def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> list[str]:
     """Names of the columns to read: time, inputs, outputs and, if all are there, the states.
 

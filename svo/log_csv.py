@@ -6,7 +6,9 @@ Floats are written in their shortest form that reads back to the same bits.
 from __future__ import annotations
 
 import csv
+import io
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from svo.log import Log
-from svo.log_columns import Array, assemble, may_be_missing, not_finite, not_there, wanted_columns
+from svo.log_columns import Array, LogNote, assemble, may_be_missing, not_finite, not_there, wanted_columns
 
 if TYPE_CHECKING:
     from svo.plant import Columns
@@ -31,8 +33,12 @@ def write_csv(path: Path, cells: Mapping[str, Array]) -> None:
 
 
 def read_csv(path: Path, columns: Columns, Ts: float) -> Log:
-    """Read a log; errors name the line and the column."""
-    with path.open(newline="", encoding="utf-8-sig") as file, csv_errors(str(path)):
+    """Read a log; errors name the line and the column.
+
+    A last line without its end is no sample: nobody can tell "2" from the beginning of "2.638". It is left out with a
+    `LogNote`.
+    """
+    with io.TextIOWrapper(_complete_lines(path), newline="", encoding="utf-8-sig") as file, csv_errors(str(path)):
         rows = _rows(file)
         parser = RowParser(str(path), next(rows, (0, []))[1], columns)
         lines, values = [], []
@@ -42,6 +48,24 @@ def read_csv(path: Path, columns: Columns, Ts: float) -> Log:
     table = np.array(values).reshape(-1, len(parser.names))
     cells = {name: table[:, i].copy() for i, name in enumerate(parser.names)}
     return assemble(str(path), cells, columns, Ts, lambda k: f"line {lines[k]}")
+
+
+def _complete_lines(path: Path) -> io.BytesIO:
+    """The bytes of a file up to the end of its last line that has one, or all of its only line."""
+    data = path.read_bytes()
+    end = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1 or len(data)  # one line is a header, whole or not: no sample
+    if data[end:].strip():
+        lines = data.count(b"\n", 0, end) or data.count(b"\r", 0, end)
+        warnings.warn(f"{path}: {no_end(lines + 1)}", LogNote, stacklevel=4)
+    return io.BytesIO(data[:end])
+
+
+def no_end(line: int) -> str:
+    """What is said of a last line that may be cut."""
+    return (
+        f"the last line ({line}) has no end and was left out, since it may be cut; "
+        "if it is whole, put a line break behind it"
+    )
 
 
 DIALECT: dict[str, Any] = {"strict": True, "skipinitialspace": True}  # of `csv.reader`

@@ -23,7 +23,6 @@ def progress(what: str) -> Iterator[Update]:
 
 @contextmanager
 def _bar(what: str) -> Iterator[Update]:
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -33,8 +32,10 @@ def _bar(what: str) -> Iterator[Update]:
         TimeRemainingColumn,
     )
 
+    from svo.terminal import console
+
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    bar = Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True))
+    bar = Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console(stderr=True))
     task = bar.add_task(what, total=None)
 
     def update(done: int, of: int) -> None:

@@ -10,7 +10,7 @@ import typer
 from svo.cli.destinations import writable_folder
 from svo.cli.frame import PREPARING, announce, app, chosen_noise, measured_log, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName
-from svo.cli.output import print_detection, print_json
+from svo.cli.output import print_detection, print_json, say
 
 
 @app.command()
@@ -59,7 +59,7 @@ def detect(
         if crossings is not None:
             typer.echo(crossings.to_text())
         if out is not None:
-            typer.echo(f"Alarms with certificates: {out / 'alarms.jsonl'}")
+            say(f"Alarms with certificates: {out / 'alarms.jsonl'}")
 
 
 @app.command()

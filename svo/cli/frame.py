@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
+from typer.core import TyperGroup
+
+from svo.terminal import ReaderGoneError, line, safe_output
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -14,7 +18,17 @@ if TYPE_CHECKING:
     from svo.log import Log
     from svo.plant import MonitoredPlant, Plant
 
+
+class _SafeGroup(TyperGroup):
+    """Commands whose output, usage errors included, goes through `svo.terminal`."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        with safe_output():
+            return super().main(*arguments, **options)
+
+
 app = typer.Typer(
+    cls=_SafeGroup,
     help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
     no_args_is_help=True,
     add_completion=False,
@@ -27,9 +41,12 @@ PREPARING = "Preparing compiled code (about a minute the first time, then kept)"
 
 @contextmanager
 def one_line_errors() -> Iterator[None]:
-    """What a user can cause becomes one line on standard error and exit code 1."""
+    """What a user can cause becomes one line on standard error and exit code 1, and notes on logs a line each."""
     try:
-        yield
+        with _notes_in_lines():
+            yield
+    except ReaderGoneError:
+        raise  # a quiet end: whoever read the output has had enough
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
     except (ValueError, TypeError, RuntimeError, ImportError, OverflowError) as error:
@@ -40,8 +57,31 @@ def one_line_errors() -> Iterator[None]:
         fail("interrupted; the runs of a study that are done are kept, and --resume goes on", code=130)
 
 
+@contextmanager
+def _notes_in_lines() -> Iterator[None]:
+    from svo.log_columns import LogNote
+
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if issubclass(category, LogNote):
+                note(str(message))
+            else:
+                others(message, category, *where)
+
+        warnings.simplefilter("always", LogNote)
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
+
+
+def note(text: str) -> None:
+    """One line on standard error, beside the results."""
+    typer.echo(f"note: {line(text)}", err=True)
+
+
 def fail(message: str, code: int = 1) -> None:
-    typer.echo(f"error: {' '.join(message.split())}", err=True)
+    typer.echo(f"error: {line(' '.join(message.split()))}", err=True)
     raise typer.Exit(code)
 
 
@@ -74,7 +114,7 @@ def measured_log(path: Path, plant: MonitoredPlant) -> Log:
             "these columns at least"
         )
     for name in silent:
-        typer.echo(f"note: {path} has no measurement of {name!r}; nothing is concluded from that sensor", err=True)
+        note(f"{path} has no measurement of {name!r}; nothing is concluded from that sensor")
     return log
 
 
@@ -88,4 +128,4 @@ def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:
 
 
 def announce(what: str) -> None:
-    typer.echo(f"{what} ...", err=True)
+    typer.echo(f"{line(what)} ...", err=True)

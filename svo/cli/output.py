@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from svo.terminal import line
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -45,11 +47,16 @@ def describe(plant: Plant) -> dict[str, Any]:
 
 def console() -> Console:
     """Where tables go."""
-    from rich.console import Console
+    from svo.terminal import console as safe_console
 
-    terminal = Console(highlight=False)
+    terminal = safe_console(highlight=False)
     # A file has no width: a table in it need not be cut off.
-    return terminal if terminal.is_terminal else Console(highlight=False, width=150)
+    return terminal if terminal.is_terminal else safe_console(highlight=False, width=150)
+
+
+def say(text: str, err: bool = False) -> None:
+    """One line, whatever names are in it."""
+    typer.echo(line(text), err=err)
 
 
 def print_json(value: Any) -> None:
@@ -65,11 +72,11 @@ def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
     for noise in dict.fromkeys(s.noise for s in summaries):
         chosen = [s for s in summaries if s.noise == noise]
         screen.print(tables.to_rich(tables.delay_table(plant, chosen)))
-        for line in [*tables.counts(chosen), *tables.not_isolated(chosen), tables.cost(chosen)]:
-            typer.echo(f"{line[0].upper()}{line[1:]}.")
+        for text in [*tables.counts(chosen), *tables.not_isolated(chosen), tables.cost(chosen)]:
+            say(f"{text[0].upper()}{text[1:]}.")
         typer.echo("")
     if plant.reference:
-        typer.echo(f"Paper: {plant.reference_title}; a dash where it says nothing.")
+        say(f"Paper: {plant.reference_title}; a dash where it says nothing.")
 
 
 def print_detector_study(found: DetectionStudy) -> None:
@@ -79,29 +86,29 @@ def print_detector_study(found: DetectionStudy) -> None:
     screen = console()
     for table in found.tables:
         screen.print(to_rich(table))
-    for line in found.findings:
-        typer.echo(f"{line[0].upper()}{line[1:]}.")
+    for text in found.findings:
+        say(f"{text[0].upper()}{text[1:]}.")
 
 
 def print_detection(found: Detection) -> None:
     """What a bank found in a log."""
     if found.detected_s is None:
-        typer.echo(f"No fault: the nominal model explains all {len(found.time)} samples ({found.noise} noise).")
+        say(f"No fault: the nominal model explains all {len(found.time)} samples ({found.noise} noise).")
     else:
-        typer.echo(f"Fault detected at {found.detected_s:g} s: the nominal model is falsified ({found.noise} noise).")
+        say(f"Fault detected at {found.detected_s:g} s: the nominal model is falsified ({found.noise} noise).")
         if found.isolated_s is not None:
-            typer.echo(f"Fault isolated at {found.isolated_s:g} s: {found.record.fault}.")
+            say(f"Fault isolated at {found.isolated_s:g} s: {found.record.fault}.")
         elif found.alive:
-            typer.echo("Not isolated: more than one model explains the data.")
+            say("Not isolated: more than one model explains the data.")
     for alarm in found.alarms:
-        typer.echo(f"    {alarm.observer}: falsified at {alarm.time:g} s")
+        say(f"    {alarm.observer}: falsified at {alarm.time:g} s")
     for name in found.alive:
-        typer.echo(f"    {name}: explains the data to the end")
+        say(f"    {name}: explains the data to the end")
     if not found.alive:
-        typer.echo(f"No model explains the data from {max(alarm.time for alarm in found.alarms):g} s on.")
+        say(f"No model explains the data from {max(alarm.time for alarm in found.alarms):g} s on.")
     undecided = int(found.record.undecided.sum())
     if undecided:
-        typer.echo(f"    undecided answers: {undecided}")
+        say(f"    undecided answers: {undecided}")
 
 
 def print_isolability(answer: Isolability) -> None:
@@ -116,7 +123,7 @@ def print_isolability(answer: Isolability) -> None:
     for fault, description in answer.faults.items():
         table.add_row(f"{fault}: {description}", *(answer.cell(fault, name) for name in observers))
     console().print(table)
-    typer.echo(
+    say(
         f"Inputs and schedule: the fault-free flight of seed {answer.seed}, from {answer.fault_time:g} s on. "
         "The first faulty sample counts as 1; an observer with a short window may need more."
     )
@@ -127,10 +134,8 @@ def print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:
     failed = [check for check in checks if not check.ok]
     for check in failed[:_SHOWN]:
         whose = f" ({check.observer}, sample {check.sample})" if check.sample >= 0 else ""
-        typer.echo(f"{path}, line {check.line}{whose}: {check.reason}", err=True)
+        say(f"{path}, line {check.line}{whose}: {check.reason}", err=True)
     if len(failed) > _SHOWN:
-        typer.echo(f"{path}: {len(failed) - _SHOWN} more that failed (--json lists all)", err=True)
+        say(f"{path}: {len(failed) - _SHOWN} more that failed (--json lists all)", err=True)
     seconds = sum(check.seconds for check in checks)
-    typer.echo(
-        f"{path}: {len(checks) - len(failed)} of {len(checks)} alarms proven in exact arithmetic, in {seconds:.2f} s"
-    )
+    say(f"{path}: {len(checks) - len(failed)} of {len(checks)} alarms proven in exact arithmetic, in {seconds:.2f} s")

@@ -103,7 +103,7 @@ def interval_settings(top: Table, columns: Columns) -> IntervalSettings | None:
         pole=table.number("pole"),
         qbar=table.count("qbar", 200),
         safety_factor=table.number("safety_factor", 1.2),
-        records=tuple(table.path.parent / name for name in _names(table, "records")),
+        records=tuple(table.path.parent / table.file_beside("records", name) for name in _names(table, "records")),
         learn_until_s=table.number("learn_until_s") if "learn_until_s" in table else None,
     )
 

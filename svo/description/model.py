@@ -35,6 +35,13 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
         raise table.error("remainder", "has no meaning for a discrete model; drop it, or say continuous = true")
     if "remainder" in table:
         rest["remainder"] = _remainder(table, arrays, rest)
+    if "n" not in arrays:
+        # Taken as zero, a bound that was forgotten falsifies the plant at its first noisy sample.
+        raise table.error(
+            "n",
+            "is missing; expected the half-widths of the measurement noise, one an output, such as n = [0.01] "
+            "(0 says that a sensor is exact)",
+        )
     with table.errors():
         make = UncertainModel.from_continuous if continuous else UncertainModel
         model = make(**{"B": None} | arrays, **rest)
@@ -103,10 +110,7 @@ def _arrays_of_file(table: Table) -> dict[str, Any]:
 
 def model_file(table: Table) -> Path:
     """The MAT file that [model] names, relative to the TOML file."""
-    file = Path(table.text("file"))
-    if file.is_absolute() or ".." in file.parts:
-        raise table.error("file", f"is {str(file)!r}; expected a file beside the TOML file, or in a folder beside it")
-    return file
+    return table.file_beside("file", table.text("file"))
 
 
 def _uncertainty(table: Table) -> Uncertainty:

@@ -83,6 +83,13 @@ class Table:
             raise self.error(key, f"is {value!r}; expected a number")
         return float(value)
 
+    def file_beside(self, key: str, name: str) -> Path:
+        """A file that a key names, relative to the TOML file: beside it, or in a folder beside it."""
+        file = Path(name)
+        if not name or file.is_absolute() or ".." in file.parts:
+            raise self.error(key, f"is {name!r}; expected a file beside the TOML file, or in a folder beside it")
+        return file
+
     def array(self, key: str) -> NDArray[np.float64]:
         """Numbers in brackets, nested for a matrix."""
         value = self._value(key, None, None)

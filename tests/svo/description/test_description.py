@@ -79,7 +79,7 @@ def test_an_observer_has_the_horizon_and_directions_of_the_file(tmp_path: Path) 
 
 def test_a_continuous_model_is_discretised(tmp_path: Path) -> None:
     discrete = CART.read_text().split("[[model.uncertainties]]")[0].split("[model]")[1]
-    matrices = "\ncontinuous = true\nA = [[0, 1], [0, 0]]\nB = [[0], [1]]\nC = [[1, 0]]\n\n[unused]\n"
+    matrices = "\ncontinuous = true\nA = [[0, 1], [0, 0]]\nB = [[0], [1]]\nC = [[1, 0]]\nn = [0.0]\n\n[unused]\n"
     text = CART.read_text().replace(discrete, matrices)
     text = text.split("[unused]")[0] + "[initial]" + text.split("[initial]")[1].split("[faults.motor]")[0]
     (tmp_path / "cart.toml").write_text(text)
@@ -126,6 +126,15 @@ def test_matrices_may_come_from_a_mat_file(tmp_path: Path) -> None:
         read_description(path)
 
 
+def test_a_noise_bound_that_was_forgotten_is_asked_for(tmp_path: Path) -> None:
+    """An exact sensor is one that the file calls exact."""
+    assert read_description(written(tmp_path, ("n = [0.05]", "n = [0.0]"))).model.bounds()[2].tolist() == [0.0]
+    savemat(tmp_path / "model.mat", {"A": [[1.0, 0.1], [0.0, 1.0]]})
+    path = written(tmp_path, ("n = [0.05]", 'file = "model.mat"'), ("A = [[1.0, 0.1], [0.0, 1.0]]", ""))
+    with pytest.raises(ValueError, match=r"key 'n': is missing; expected the half-widths"):
+        read_description(path)
+
+
 def test_what_is_kept_is_never_copied_onto_itself(tmp_path: Path) -> None:
     path = written(tmp_path)
     keep_description(read_description(path), tmp_path)
@@ -150,6 +159,8 @@ ERRORS: list[tuple[tuple[str, str], list[str]]] = [
     (("C = [[1.0, 0.0]]", "C = [[1.0, nan]]"), ["[model]", "NaN or Inf"]),
     (("w = [0.2]", "w = { lower = [0.2] }"), ["[model.w], key 'upper': is missing"]),
     (("w = [0.2]", ""), ["[model]", "w is missing"]),
+    (("n = [0.05]", ""), ["[model], key 'n': is missing", "one an output"]),
+    (("n = [0.05]", "n = []"), ["[model]", "n has shape (0,)"]),
     (("n = [0.05]", "n = [-0.05]"), ["[model]", "expected finite half-widths >= 0"]),
     (("n = [0.05]", "n = [0.05]\nremainder = [1.0]"), ["key 'remainder'", "continuous = true"]),
     (("B = [[0.0], [0.01]]", ""), ["[model.uncertainties, entry 1]", "no direction"]),
