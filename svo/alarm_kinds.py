@@ -6,15 +6,25 @@ in hexadecimal, so that a stored proof is about exactly the numbers that the obs
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes import Certificate, HPolytope
+from polytopes import Certificate
+from svo.alarm_values import (
+    check_keys,
+    decode_array,
+    decode_arrays,
+    decode_integer,
+    decode_integers,
+    decode_set,
+    encode_value,
+)
 from svo.log import Log
+from svo.model_digest import ModelSample
 from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.polytope_step import MeasuredOutput, PolytopeCertificate
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
@@ -38,6 +48,8 @@ class AlarmKind:
     decode : callable
         The other way; any ArithmeticError, AttributeError, LookupError, TypeError or ValueError says that the record
         is none of this kind.
+    model_data : callable
+        Certificate to what it holds of its model, a `ModelSample` for each sample up to that of the falsification.
     proves : callable
         Certificate to the words for what a proof that holds has shown.
     difference : callable
@@ -47,7 +59,8 @@ class AlarmKind:
     name: str
     certificate: type
     encode: Callable[[Any], Any]
-    decode: Callable[[Mapping[str, Any]], Any]
+    decode: Callable[[Any], Any]
+    model_data: Callable[[Any], tuple[ModelSample, ...]]
     proves: Callable[[Any], str]
     difference: Callable[[Any, int, Log], str | None]
 
@@ -67,45 +80,12 @@ def kind_of(certificate: Any) -> AlarmKind:
     raise TypeError(f"certificate is {type(certificate).__name__}, which no alarm can store; expected one of {known}")
 
 
-# -- values ------------------------------------------------------------------------------------------------------
+def model_data(certificate: Any) -> tuple[ModelSample, ...]:
+    """What a certificate holds of its model, sample by sample up to that of the falsification."""
+    return kind_of(certificate).model_data(certificate)
 
 
-def encode_value(value: Any) -> Any:
-    """Arrays, tuples and dataclasses of them as lists, dicts and text."""
-    if isinstance(value, np.ndarray):
-        if np.issubdtype(value.dtype, np.integer):
-            return value.tolist()
-        return {"shape": list(value.shape), "hex": " ".join(_hex(v) for v in value.ravel())}
-    if isinstance(value, tuple):
-        return [encode_value(item) for item in value]
-    if isinstance(value, HPolytope):
-        return {part: encode_value(getattr(value, part)) for part in "AbCd"}
-    if isinstance(value, Certificate):
-        return value.to_dict()
-    if hasattr(type(value), "__dataclass_fields__"):
-        return {f.name: encode_value(getattr(value, f.name)) for f in fields(value)}
-    return value
-
-
-def decode_array(value: Any) -> Array:
-    """A float array that `encode_value` wrote."""
-    numbers = np.array([float.fromhex(v) for v in value["hex"].split()])
-    return numbers.reshape(value["shape"])
-
-
-def decode_arrays(record: Mapping[str, Any]) -> dict[str, Array]:
-    """Every entry of a record as a float array."""
-    return {key: decode_array(value) for key, value in record.items()}
-
-
-def decode_set(record: Mapping[str, Any]) -> HPolytope:
-    """A polytope that `encode_value` wrote."""
-    return HPolytope(*(decode_array(record[part]) for part in "AbCd"))
-
-
-def _hex(value: float) -> str:
-    text = float(value).hex()
-    return "0" if text == "0x0.0p+0" else text
+# -- comparisons with a log ---------------------------------------------------------------------------------------
 
 
 def output_difference(k: int, y: Array, u: Array, driven: bool, log: Log) -> str | None:
@@ -124,16 +104,28 @@ def output_difference(k: int, y: Array, u: Array, driven: bool, log: Log) -> str
 # -- window observers --------------------------------------------------------------------------------------------
 
 
-def _decode_window(record: Mapping[str, Any]) -> WindowCertificate:
-    arrays = {key: decode_array(value) for key, value in record.items() if isinstance(value, dict) and "hex" in value}
+_NO_ARRAYS = {"first", "last", "n", "late", "owner", "arrival", "samples"}
+
+
+def _names(kind: type) -> set[str]:
+    return {field.name for field in fields(kind)}
+
+
+def _decode_window(record: Any) -> WindowCertificate:
+    check_keys(record, _names(WindowCertificate))
+    if type(record["late"]) is not bool:
+        raise TypeError("late is not true or false")
+    if not isinstance(record["samples"], list):
+        raise TypeError("samples is no list")
+    arrays: dict[str, Any] = {name: decode_array(record[name]) for name in record.keys() - _NO_ARRAYS}
     return WindowCertificate(
-        first=int(record["first"]),
-        last=int(record["last"]),
-        n=int(record["n"]),
-        late=bool(record["late"]),
-        owner=np.array(record["owner"], dtype=np.int64),
-        arrival=ArrivalSet(**decode_arrays(record["arrival"])),
-        samples=tuple(WindowSample(**decode_arrays(sample)) for sample in record["samples"]),
+        first=decode_integer(record["first"]),
+        last=decode_integer(record["last"]),
+        n=decode_integer(record["n"]),
+        late=record["late"],
+        owner=decode_integers(record["owner"]),
+        arrival=ArrivalSet(**decode_arrays(record["arrival"], _names(ArrivalSet))),
+        samples=tuple(WindowSample(**decode_arrays(sample, _names(WindowSample))) for sample in record["samples"]),
         **arrays,
     )
 
@@ -151,12 +143,27 @@ def _window_difference(c: WindowCertificate, last: int, log: Log) -> str | None:
     return None
 
 
+def _window_model(c: WindowCertificate) -> tuple[ModelSample, ...]:
+    """w of the last sample is no part of a window unless it enters the output there."""
+    return tuple(
+        ModelSample(s.stack, s.noise, (s.w_lower, s.w_upper) if c.late or k < c.last else None)
+        for k, s in enumerate(c.samples, start=c.first)
+    )
+
+
 WINDOW = AlarmKind(
-    "window", WindowCertificate, encode_value, _decode_window, lambda _: "the arrival set", _window_difference
+    "window",
+    WindowCertificate,
+    encode_value,
+    _decode_window,
+    _window_model,
+    lambda _: "the arrival set",
+    _window_difference,
 )
 
 
-def _decode_split(record: Mapping[str, Any]) -> SplitCertificate:
+def _decode_split(record: Any) -> SplitCertificate:
+    check_keys(record, _names(SplitCertificate))
     cells = tuple(_decode_window(cell) for cell in record["cells"])
     return SplitCertificate(cells, decode_array(record["s_lower"]), decode_array(record["s_upper"]))
 
@@ -170,6 +177,7 @@ SPLIT = AlarmKind(
     SplitCertificate,
     encode_value,
     _decode_split,
+    lambda c: _window_model(c.cells[0]),
     lambda _: "the arrival set",
     _split_difference,
 )
@@ -178,9 +186,10 @@ SPLIT = AlarmKind(
 # -- constrained-zonotope observers ------------------------------------------------------------------------------
 
 
-def _decode_zonotope(record: Mapping[str, Any]) -> ZonotopeCertificate:
+def _decode_zonotope(record: Any) -> ZonotopeCertificate:
+    check_keys(record, _names(ZonotopeCertificate))
     return ZonotopeCertificate(
-        arrival=ConstrainedZonotope(**decode_arrays(record["arrival"])),
+        arrival=ConstrainedZonotope(**decode_arrays(record["arrival"], _names(ConstrainedZonotope))),
         multipliers=decode_array(record["multipliers"]),
         window=_decode_window(record["window"]),
     )
@@ -195,6 +204,7 @@ ZONOTOPE = AlarmKind(
     ZonotopeCertificate,
     encode_value,
     _decode_zonotope,
+    lambda c: _window_model(c.window),
     lambda _: "the arrival set",
     _zonotope_difference,
 )
@@ -209,13 +219,14 @@ def _encode_polytope(c: PolytopeCertificate) -> Any:
     return encode_value(c)
 
 
-def _decode_polytope(record: Mapping[str, Any]) -> PolytopeCertificate:
+def _decode_polytope(record: Any) -> PolytopeCertificate:
+    check_keys(record, _names(PolytopeCertificate))
     return PolytopeCertificate(
-        sample=int(record["sample"]),
+        sample=decode_integer(record["sample"]),
         before=tuple(decode_set(item) for item in record["before"]),
         measurement=decode_set(record["measurement"]),
         multipliers=Certificate.from_dict(record["multipliers"]),
-        data=MeasuredOutput(**decode_arrays(record["data"])),
+        data=MeasuredOutput(**decode_arrays(record["data"], _names(MeasuredOutput))),
     )
 
 
@@ -232,8 +243,19 @@ def _polytope_difference(c: PolytopeCertificate, last: int, log: Log) -> str | N
     return output_difference(last, c.data.y, c.data.u, driven, log)
 
 
+def _polytope_model(c: PolytopeCertificate) -> tuple[ModelSample, ...]:
+    assert c.data is not None
+    return (ModelSample(c.data.stack, c.data.noise, None),)
+
+
 POLYTOPE = AlarmKind(
-    "polytope", PolytopeCertificate, _encode_polytope, _decode_polytope, _polytope_proves, _polytope_difference
+    "polytope",
+    PolytopeCertificate,
+    _encode_polytope,
+    _decode_polytope,
+    _polytope_model,
+    _polytope_proves,
+    _polytope_difference,
 )
 
 KINDS = (WINDOW, SPLIT, ZONOTOPE, POLYTOPE)

@@ -11,16 +11,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from svo.alarm_kinds import KINDS, kind_of
+from svo.alarm_values import check_keys, decode_float, decode_integer
 from svo.log import Log
 
 FORMAT = "svo-alarm-2"
+_ENTRIES = {"format", "kind", "observer", "sample", "time", "source", "certificate", "sha256"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,8 @@ class Alarm:
     certificate : WindowCertificate or another that `svo.alarm_kinds` can store
     source : mapping
         Where the data come from: plant, noise set, seed, file.
+    model : str or None
+        Digest of the model and of the observer's options (`svo.model_digest`); None in records of before there was one.
     """
 
     observer: str
@@ -45,6 +49,7 @@ class Alarm:
     time: float
     certificate: Any
     source: Mapping[str, str | int | float]
+    model: str | None = None
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,9 @@ class AlarmCheck:
     ok: bool
     reason: str
     seconds: float
+
+
+ModelDifference = Callable[[Alarm], str | None]
 
 
 def write_alarms(path: str | Path, alarms: Iterable[Alarm]) -> None:
@@ -88,15 +96,25 @@ def read_alarms(path: str | Path) -> list[Alarm]:
     return alarms
 
 
-def verify_alarms(path: str | Path, log: Log | None = None) -> list[AlarmCheck]:
+def verify_alarms(
+    path: str | Path, log: Log | None = None, model_difference: ModelDifference | None = None
+) -> list[AlarmCheck]:
     """Check every stored alarm: digest, proof in exact arithmetic and, given the log, the data.
+
+    Parameters
+    ----------
+    path : path
+    log : Log, optional
+    model_difference : callable, optional
+        An alarm to the way in which its model is not the one that it names, or None, as `svo.verification.PlantModels`
+        gives it. Asked only where the log is given.
 
     Raises
     ------
     ValueError
         If no line is a JSON object, so that the file is none of alarms. An empty file has no checks.
     """
-    return [_check(number, text, log) for number, text in _lines(path)]
+    return [_check(number, text, log, model_difference) for number, text in _lines(path)]
 
 
 def _lines(path: str | Path) -> list[tuple[int, str]]:
@@ -123,20 +141,26 @@ class _BadRecord(ValueError):
     """A line that is no intact alarm record."""
 
 
-def _check(number: int, text: str, log: Log | None) -> AlarmCheck:
+def _check(number: int, text: str, log: Log | None, model_difference: ModelDifference | None) -> AlarmCheck:
     begun = perf_counter()
     try:
         alarm = _decode(text)
     except _BadRecord as error:
         return AlarmCheck(number, "?", -1, False, str(error), perf_counter() - begun)
     kind = kind_of(alarm.certificate)
-    ok, reason = alarm.certificate.verify(), "the proof does not hold"
-    if ok:
-        reason = f"proven given {kind.proves(alarm.certificate)}"
-        if log is not None:
-            difference = _difference(alarm, log) or kind.difference(alarm.certificate, alarm.sample, log)
-            ok, reason = difference is None, difference or reason + ", data as in the log"
-    return AlarmCheck(number, alarm.observer, alarm.sample, ok, reason, perf_counter() - begun)
+    proven = f"proven given {kind.proves(alarm.certificate)}"
+    compared = ", data as in the log"
+    if not alarm.certificate.verify():
+        wrong: str | None = "the proof does not hold"
+    elif log is None:
+        wrong, compared = None, " and that its model is the plant's"
+    else:
+        wrong = _difference(alarm, log) or kind.difference(alarm.certificate, alarm.sample, log)
+        if model_difference is not None:
+            wrong = wrong or model_difference(alarm)
+            compared += ", model as the plant's" if alarm.model else ", model not compared beyond matrices and bounds"
+    ok, seconds = wrong is None, perf_counter() - begun
+    return AlarmCheck(number, alarm.observer, alarm.sample, ok, wrong or proven + compared, seconds)
 
 
 def _difference(alarm: Alarm, log: Log) -> str | None:
@@ -164,7 +188,7 @@ def _line(alarm: Alarm) -> str:
 
 def _encode(alarm: Alarm) -> dict[str, Any]:
     kind = kind_of(alarm.certificate)
-    return {
+    return ({} if alarm.model is None else {"model": alarm.model}) | {
         "format": FORMAT,
         "kind": kind.name,
         "observer": alarm.observer,
@@ -188,12 +212,32 @@ def _decode(text: str) -> Alarm:
     if kind is None:
         raise _BadRecord(f"no certificate of a known kind; known are {', '.join(kind.name for kind in KINDS)}")
     try:
+        check_keys(record, _ENTRIES | ({"model"} & record.keys()))
         return Alarm(
-            observer=str(record["observer"]),
-            sample=int(record["sample"]),
-            time=float.fromhex(record["time"]),
+            observer=_text(record["observer"]),
+            sample=_number(record["sample"]),
+            time=decode_float(record["time"]),
             certificate=kind.decode(record["certificate"]),
-            source=dict(record["source"]),
+            source=_source(record["source"]),
+            model=_text(record["model"]) if "model" in record else None,
         )
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise _BadRecord(f"incomplete alarm record ({type(error).__name__}: {error})") from error
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError("expected text")
+    return value
+
+
+def _number(value: Any) -> int:
+    if decode_integer(value) < 0:
+        raise ValueError("sample is negative")
+    return int(value)
+
+
+def _source(value: Any) -> dict[str, str | int | float]:
+    if not isinstance(value, dict) or not all(isinstance(v, str | int | float) for v in value.values()):
+        raise TypeError("source is no table of text and numbers")
+    return dict(value)

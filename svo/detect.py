@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.alarm_kinds import model_data
 from svo.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.log import Log
 from svo.log_columns import check_times, columns_of_log
+from svo.model_digest import model_digest
+from svo.observers.step import Observer
 from svo.plant import MonitoredPlant, Scheduler, architecture_of, schedule_of
 
 
@@ -148,13 +151,35 @@ def detect(
             progress(verdict.sample + 1, len(log))
     record = recorder.record()
     origin = {**source_of_bank(plant), "noise": noise, **(source or {})}
-    return Detection(plant.name, noise, log.time, record, alarms_of(record, log, origin))
+    return Detection(plant.name, noise, log.time, record, alarms_of(record, log, origin, bank.observers))
 
 
-def alarms_of(record: BankRecord, log: Log, source: Mapping[str, str | int | float]) -> tuple[Alarm, ...]:
-    """Every certified falsification of a record, in order of time."""
+def alarms_of(
+    record: BankRecord,
+    log: Log,
+    source: Mapping[str, str | int | float],
+    observers: Mapping[str, Observer] | None = None,
+) -> tuple[Alarm, ...]:
+    """Every certified falsification of a record, in order of time.
+
+    With the ``observers`` of the bank each alarm carries the digest of its model.
+    """
     died = sorted((sample, name) for name, sample in record.died_at.items() if sample is not None)
-    return tuple(Alarm(name, k, float(log.time[k]), record.certificates[name], source) for k, name in died)
+    alarms = []
+    for k, name in died:
+        proof = record.certificates[name]
+        model = None if observers is None else digest_of_alarm(observers[name], proof)
+        alarms.append(Alarm(name, k, float(log.time[k]), proof, source, model))
+    return tuple(alarms)
+
+
+def digest_of_alarm(observer: Observer, certificate: Any) -> str | None:
+    """Digest of an observer's model and options with the numbers that a certificate holds of it.
+
+    None for an observer of the user's own that names no options.
+    """
+    options = getattr(observer, "options", None)
+    return None if options is None else model_digest(observer.model, options, model_data(certificate))
 
 
 def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:

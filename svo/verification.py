@@ -8,22 +8,69 @@ from time import perf_counter
 
 import numpy as np
 
+from svo.alarm_kinds import model_data
 from svo.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms
-from svo.detect import verdicts
+from svo.detect import digest_of_alarm, verdicts
 from svo.isolation.architectures import ArchitectureII
 from svo.isolation.bank import Bank
 from svo.isolation.logic import GLOBAL
 from svo.log import Log
+from svo.model_digest import ModelSample
 from svo.observers.chain import ProvingObserver
 from svo.observers.window import WindowObserver
 from svo.plant import MonitoredPlant, in_architecture, schedule_of
 
 
+class PlantModels:
+    """Compares the models of alarms with those of the plant's banks, at the scheduling values of a log.
+
+    Parameters
+    ----------
+    plant : MonitoredPlant
+    log : Log
+        Only time, u and y are used; the plant's own scheduler makes the schedule of them.
+
+    Attributes
+    ----------
+    log : Log
+        With that schedule.
+    """
+
+    def __init__(self, plant: MonitoredPlant, log: Log) -> None:
+        self._plant = plant
+        scheduler = plant.scheduler()
+        values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
+        self.log = replace(log, schedule=None if values[0] is None else np.array(values, dtype=float))
+
+    def bank(self, alarm: Alarm) -> Bank:
+        """A fresh bank of the architecture and noise set that an alarm names."""
+        architecture = alarm.source.get("architecture")
+        chosen = in_architecture(self._plant, None if architecture is None else str(architecture))
+        return chosen.bank(str(alarm.source.get("noise")))
+
+    def difference(self, alarm: Alarm) -> str | None:
+        """How an alarm's matrices, bounds and digest are not those of the plant's observer that it names, or None."""
+        observer = self.bank(alarm).observers.get(alarm.observer)
+        if observer is None:
+            return f"the plant's bank has no model {alarm.observer!r:.80}"
+        claimed = model_data(alarm.certificate)
+        first = alarm.sample + 1 - len(claimed)
+        right = [ModelSample.of(observer.model, self.log.schedule_at(first + i)) for i in range(len(claimed))]
+        for k, (mine, its) in enumerate(zip(claimed, right, strict=True), start=first):
+            what = mine.difference(its)
+            if what is not None:
+                return f"the {what} of sample {k} differs from that of the plant's model {alarm.observer!r}"
+        # The certificate's numbers are the plant's by now, so only sizes, sampling time and options can differ.
+        if alarm.model is not None and alarm.model != digest_of_alarm(observer, alarm.certificate):
+            return f"the digest is not that of the plant's observer {alarm.observer!r}: it has other options or bounds"
+        return None
+
+
 def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:
     """Check every stored alarm and, if it holds, run its bank over the log again and prove every bound of its observer.
 
-    The observers are those of the plant's bank for the noise set and architecture that the alarm names, so this also
-    checks that the alarm's model is the plant's. An observer that starts during the run, as those of class II do, is
+    The observers are those of the plant's bank for the noise set and architecture that the alarm names, and the
+    alarm's model must be the plant's. An observer that starts during the run, as those of class II do, is
     proven from the set that it starts from: a constant set as given, that of a global observer with its own proof.
     Bounds are proven over convex hulls; an alarm that only a split by signs gives fails, and the reason says so.
 
@@ -35,20 +82,16 @@ def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[Ala
         Only time, u and y are used; the plant's own scheduler makes the schedule from y.
     plant : MonitoredPlant
     """
-    checks = verify_alarms(path, log)
+    models = PlantModels(plant, log)
+    checks = verify_alarms(path, log, models.difference)
     if not all(check.ok for check in checks):
         return checks
-    scheduler = plant.scheduler()
-    values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
-    known = replace(log, schedule=None if values[0] is None else np.array(values, dtype=float))
-    return [_with_chain(check, alarm, known, plant) for check, alarm in zip(checks, read_alarms(path), strict=True)]
+    return [_with_chain(check, alarm, models) for check, alarm in zip(checks, read_alarms(path), strict=True)]
 
 
-def _with_chain(check: AlarmCheck, alarm: Alarm, log: Log, plant: MonitoredPlant) -> AlarmCheck:
+def _with_chain(check: AlarmCheck, alarm: Alarm, models: PlantModels) -> AlarmCheck:
     begun = perf_counter()
-    architecture = alarm.source.get("architecture")
-    chosen = in_architecture(plant, None if architecture is None else str(architecture))
-    ok, reason = _prove(chosen.bank(str(alarm.source.get("noise"))), alarm, log)
+    ok, reason = _prove(models.bank(alarm), alarm, models.log)
     return replace(check, ok=ok, reason=reason, seconds=check.seconds + perf_counter() - begun)
 
 

@@ -24,7 +24,8 @@ def verify(
         Path, typer.Argument(metavar="ALARMS", help="An alarms.jsonl of `svo study`, `svo detect` or `svo watch`.")
     ],
     log: Annotated[
-        Path | None, typer.Option(metavar="LOG", help="Also compare the alarms' data with this log.")
+        Path | None,
+        typer.Option(metavar="LOG", help="Also compare the alarms' data with this log, and models with the plant."),
     ] = None,
     full: Annotated[
         Path | None,
@@ -34,7 +35,8 @@ def verify(
 ) -> None:
     """Check every stored alarm: its digest, its proof in exact arithmetic, and its data if the log is given.
 
-    A window's proof is conditional on the set of states at its start. With --full the plant's observers are run
+    A window's proof is conditional on the set of states at its start, and on the model that is stored with it; with a
+    log that is compared with the plant's. With --full the plant's observers are run
     over the log again, and every bound from the first sample to the alarm is proven in exact arithmetic (some
     seconds an alarm). The exit code is 1 if any alarm fails, and if there is none.
 
@@ -81,8 +83,8 @@ def _checks(path: Path, log: Path | None, full: Path | None) -> list[AlarmCheck]
     # A description lies beside the alarms, where `svo detect` put it.
     plant = find_plant(str(alarms[0].source.get("plant")), path.parent)
     data = read_log(wanted, plant.columns, plant.Ts)
-    if full is None:
-        return verify_alarms(path, data)
-    from svo.verification import verify_chains
+    from svo.verification import PlantModels, verify_chains
 
+    if full is None:
+        return verify_alarms(path, data, PlantModels(plant, data).difference)
     return verify_chains(path, data, plant)

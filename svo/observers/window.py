@@ -221,6 +221,12 @@ class WindowObserver(WindowPrograms):
             raise ValueError("there is no sample yet; call update(y0), with NaN if there is no measurement")
         return int(self._arrays["clock"][kernel.BASE]), self._time
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
+        horizon, cells = self.horizon, self.sign_split
+        return {"kind": "window", "horizon": horizon, "template": self._template, "eps": self.eps, "sign_split": cells}
+
     def state_dict(self) -> dict[str, Array]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
         settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps, self.sign_split])

@@ -173,6 +173,12 @@ class ConstrainedZonotopeObserver:
         other.step(u, y, u, self.model.schedule).box  # noqa: B018
         return perf_counter() - begun
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
+        limits = {"max_generators": self.max_generators, "max_constraints": self.max_constraints}
+        return {"kind": "constrained zonotope", **limits, "eps": self.eps}
+
     def state_dict(self) -> dict[str, Array]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
         falsified = float(self._falsified is not None)

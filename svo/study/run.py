@@ -93,9 +93,11 @@ def execute(plant: Plant, job: Job) -> RunOutcome:
     """Simulate one run and judge it; bit for bit the same for the same job, times of computation aside."""
     plant = in_architecture(plant, job.architecture)
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
-    record = plant.bank(job.noise).run(log)
+    bank = plant.bank(job.noise)
+    record = bank.run(log)
     exemplar = follow(plant, job, log) if job.exemplary else None
-    return RunOutcome(judge(plant, job, log, record), alarms_of(record, log, source_of(plant, job)), exemplar)
+    alarms = alarms_of(record, log, source_of(plant, job), bank.observers)
+    return RunOutcome(judge(plant, job, log, record), alarms, exemplar)
 
 
 def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.alarms import Alarm
-from svo.detect import source_of_bank
+from svo.detect import digest_of_alarm, source_of_bank
 from svo.isolation.record import Verdict
 from svo.log_columns import is_sampled, wrong_step
 from svo.log_csv import DIALECT, RowParser, csv_errors
@@ -145,11 +145,12 @@ class Session:
         """Models that died just now; one that is alive again is forgotten."""
         self._dead = {name: alarm for name, alarm in self._dead.items() if name not in verdict.alive}
         origin = source_of_bank(self.plant) | {"noise": self.noise, "log": Path(self.source).name}
-        new = [
-            Alarm(name, verdict.sample, self._time, verdict.steps[name].certificate, origin)
-            for name in self.names
-            if name not in verdict.alive and name not in self._dead and name in verdict.steps
-        ]
+        new = []
+        for name in self.names:
+            if name not in verdict.alive and name not in self._dead and name in verdict.steps:
+                proof = verdict.steps[name].certificate
+                model = digest_of_alarm(self._bank.observers[name], proof)
+                new.append(Alarm(name, verdict.sample, self._time, proof, origin, model))
         self._dead |= {alarm.observer: alarm for alarm in new}
         return new
 
