@@ -108,12 +108,18 @@ class SPRTDetector(ResidualTestDetector):
     )
 
     def channel_scores(self, parameters: Mapping[str, float], white: Array) -> Array:
-        # With a threshold for H1 that is never reached the statistic is what any threshold is compared with.
-        sides = [
-            SPRT(change=sign * parameters["change"], false_alarm=1e-300, non_detection=parameters["non_detection"])
-            for sign in (1, -1)
-        ]
-        return np.maximum(*(side.run(white).statistic for side in sides))
+        sides = [SPRT(change=sign * parameters["change"]).increments(white) for sign in (1, -1)]
+        return np.maximum(*(_since_healthy(side, float(np.log(parameters["non_detection"]))) for side in sides))
+
+
+def _since_healthy(increments: Array, lowest: float) -> Array:
+    """ln L (K,) of the samples since it was last below its threshold for H0; no threshold for H1 begins it again."""
+    scores, total = np.empty(increments.size), 0.0
+    for k, increment in enumerate(increments.tolist()):
+        total += increment
+        scores[k] = total
+        total = total if total >= lowest else 0.0
+    return scores
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from svo.baselines.parity import ParitySpace
 from svo.comparison.detector import NOBODY, Detection, Parameter, Setting
 from svo.comparison.threshold import ThresholdDetector
 from svo.log import Log
-from svo.residual_tests.interface import above
+from svo.residual_tests.interface import above, row_sums
 
 Array = NDArray[np.float64]
 PROCESS_NOISE = Parameter(1e-2, 1e2, logarithmic=True)
@@ -156,8 +156,8 @@ def window_sums(squares: Array, samples: float) -> Array:
     count = int(samples)
     sums = np.full(squares.size, np.nan)
     if squares.size >= count:
-        totals = np.cumsum(np.append(0.0, squares))
-        sums[count - 1 :] = totals[count:] - totals[:-count]
+        # Not as differences of running totals: after one huge value these have lost all the small ones.
+        sums[count - 1 :] = row_sums(np.lib.stride_tricks.sliding_window_view(squares, count))
     return sums
 
 

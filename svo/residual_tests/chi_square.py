@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from svo.residual_tests.interface import WindowTest, check_count, check_probability
+from svo.residual_tests.interface import WindowTest, check_count, check_probability, row_sums
 
 Array = NDArray[np.float64]
 
@@ -45,4 +45,4 @@ class ChiSquare(WindowTest):
         return float(chi2.isf(self.false_alarm_rate, self.degrees * self.samples))
 
     def _statistics(self, windows: Array) -> Array:
-        return np.asarray(windows.sum(axis=1))
+        return row_sums(windows)

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
-from scipy.stats import norm
 
 from svo.residual_tests.interface import Decision, ResidualTest, above, check_finite, check_positive
+from svo.residual_tests.run_length import LARGEST_DRIFT, LARGEST_THRESHOLD, log_run_length
 
 Array = NDArray[np.float64]
-_NODES = 64  # of the Gauss-Legendre rule; doubling it changes the run length by less than 1e-10
+_LARGEST = float(np.log(np.finfo(float).max))
 
 
 @dataclass(frozen=True)
@@ -21,8 +20,8 @@ class CUSUM(ResidualTest):
 
     S1 = max(S1 + r - mean - d/2, 0), S2 = max(S2 - r + mean - d/2, 0), d the size of the change: equation (49), in
     which mu1 stands for that size, not for the changed mean. The statistic is max(S1, S2). False-alarm rate:
-    `average_run_length` gives the mean number of samples to an alarm without a fault, exactly (to the
-    quadrature), for independent Gaussian residuals; its inverse is the rate per sample.
+    `average_run_length` gives the mean number of samples to an alarm without a fault, for independent Gaussian
+    residuals; its inverse is the rate per sample.
 
     Parameters
     ----------
@@ -50,38 +49,69 @@ class CUSUM(ResidualTest):
     def average_run_length(self, sigma: float) -> float:
         """Mean number of samples to an alarm without a fault, for independent Gaussian residuals.
 
-        One side is a Markov process on [0, threshold]; its mean run length L solves Page's integral equation
-        L(z) = 1 + L(0) Phi(k - z) + integral_0^h L(x) phi(x - z + k) dx in units of sigma, k = d/2. Both sides have
-        the same, and together half of it (Kemp 1961).
+        Infinite where it is beyond the floats, as `log_average_run_length` never is.
 
         Parameters
         ----------
         sigma : float
             Standard deviation of the residual, positive.
+
+        Raises
+        ------
+        ValueError
+            If sigma is not positive, or the threshold over 10,000 sigma while the change is so small that L is finite.
         """
+        k, h = self._in_units_of(sigma)
+        # L >= exp(2 k h), and from k = 40 on one step from zero is a chance below 1e-308.
+        if 2 * k * h - np.log(2) > _LARGEST or k > LARGEST_DRIFT:
+            return float("inf")
+        length = self.log_average_run_length(sigma)
+        return float(np.exp(length)) if length <= _LARGEST else float("inf")
+
+    def log_average_run_length(self, sigma: float) -> float:
+        """Natural logarithm of `average_run_length`, to about 1e-9.
+
+        Each side has the same mean run length, and together half of it (Kemp 1961), which is exact here: while one
+        side grows to the threshold the other is at zero. See `svo.residual_tests.run_length`.
+
+        Parameters
+        ----------
+        sigma : float
+            Standard deviation of the residual, positive.
+
+        Raises
+        ------
+        ValueError
+            If sigma is not positive, the change over 80 sigma, or the threshold over 10,000 sigma.
+        """
+        k, h = self._in_units_of(sigma)
+        if k > LARGEST_DRIFT or h > LARGEST_THRESHOLD:
+            raise ValueError(
+                f"change is {2 * k:g} sigma and threshold {h:g} sigma; expected at most {2 * LARGEST_DRIFT:g} and "
+                f"{LARGEST_THRESHOLD:g}: is sigma in the units of the residual?"
+            )
+        return log_run_length(k, h) - float(np.log(2))
+
+    def _in_units_of(self, sigma: float) -> tuple[float, float]:
+        """Half the change, and the threshold."""
         check_positive(sigma=sigma)
-        k, h = self.change / 2 / sigma, self.threshold / sigma
-        nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-        x, weights = h * (nodes + 1) / 2, h * weights / 2
-        z = np.append(0.0, x)  # L at zero and at the nodes
-        kernel = np.hstack([ndtr(k - z)[:, None], norm.pdf(x[None, :] - z[:, None] + k) * weights])
-        return float(np.linalg.solve(np.eye(z.size) - kernel, np.ones(z.size))[0] / 2)
+        return self.change / 2 / sigma, self.threshold / sigma
 
     def _run(self, r: Array) -> tuple[Array, NDArray[np.bool_]]:
-        statistic = np.maximum(_reflected(r - self.mean - self.change / 2), _reflected(self.mean - r - self.change / 2))
+        statistic, state = np.empty(r.size), self._begin()
+        for i, residual in enumerate(r.tolist()):
+            state = self._sums(state, residual)
+            statistic[i] = max(state)
         return statistic, above(statistic, self.threshold)
 
     def _begin(self) -> tuple[float, float]:
         return 0.0, 0.0
 
     def _advance(self, state: tuple[float, float], r: float) -> tuple[tuple[float, float], Decision]:
-        up = max(state[0] + r - self.mean - self.change / 2, 0.0)
-        down = max(state[1] - r + self.mean - self.change / 2, 0.0)
-        statistic = max(up, down)
-        return (up, down), Decision(statistic, statistic > self.threshold)
+        state = self._sums(state, r)
+        return state, Decision(max(state), max(state) > self.threshold)
 
-
-def _reflected(increments: Array) -> Array:
-    """S(k) = max(S(k-1) + increment, 0) from S = 0: the sums minus the least of them so far, and of zero."""
-    sums = np.cumsum(increments)
-    return np.asarray(sums - np.minimum(np.minimum.accumulate(sums), 0.0)) if sums.size else sums
+    def _sums(self, state: tuple[float, float], r: float) -> tuple[float, float]:
+        """S1 and S2 after one more residual."""
+        offset, half = r - self.mean, self.change / 2
+        return max(state[0] + (offset - half), 0.0), max(state[1] - (offset + half), 0.0)

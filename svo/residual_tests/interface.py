@@ -125,6 +125,14 @@ class WindowTest(ResidualTest):
         return window, Decision(statistic, statistic > self.threshold)
 
 
+def row_sums(windows: Array) -> Array:
+    """Sums (m,) of rows, term by term in their order: of a row alone the same bits as of the row among others."""
+    total = windows[:, 0].copy()
+    for column in windows.T[1:]:
+        total += column
+    return total
+
+
 def above(statistic: Array, threshold: float) -> NDArray[np.bool_]:
     """Where the statistic is there and above the threshold."""
     return np.greater(statistic, threshold, where=~np.isnan(statistic), out=np.zeros(statistic.shape, dtype=bool))

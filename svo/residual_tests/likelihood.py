@@ -16,6 +16,7 @@ from svo.residual_tests.interface import (
     check_finite,
     check_positive,
     check_probability,
+    row_sums,
 )
 
 Array = NDArray[np.float64]
@@ -62,7 +63,8 @@ class GLR(WindowTest):
         return float(chi2.isf(self.false_alarm_rate, 1) / 2)
 
     def _statistics(self, windows: Array) -> Array:
-        return np.asarray(self.samples * (windows.mean(axis=1) - self.mean) ** 2 / (2 * self.sigma**2))
+        offset = row_sums((windows - self.mean) / self.sigma)
+        return np.asarray(offset**2 / (2 * self.samples))
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ class SPRT(ResidualTest):
 
     def increments(self, residual: Array) -> Array:
         """ln of the likelihood ratio of each sample alone."""
-        return np.asarray(self.change / self.sigma**2 * (residual - self.mean - self.change / 2))
+        return np.asarray(self.change / self.sigma * ((residual - self.mean - self.change / 2) / self.sigma))
 
     def _run(self, r: Array) -> tuple[Array, NDArray[np.bool_]]:
         statistic, alarm = np.empty(r.size), np.zeros(r.size, dtype=bool)

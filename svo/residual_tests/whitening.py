@@ -60,7 +60,7 @@ class Whitening:
         centred = [r - mean for r in runs]
         total = sum(r.size for r in centred)
         covariance = np.array([sum(r[j:] @ r[: r.size - j] for r in centred) / total for j in range(order + 1)])
-        if covariance[0] <= 0:
+        if covariance[0] <= 0 or np.ptp(np.concatenate(runs)) == 0:  # a mean is rounded, so the first may be 1e-34
             raise ValueError("the residuals do not vary; expected noise to estimate a standard deviation from")
         coefficients = solve_toeplitz(covariance[:-1], covariance[1:]) if order else np.empty(0)
         variance = float(covariance[0] - coefficients @ covariance[1:])
