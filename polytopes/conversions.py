@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes.errors import as_array
+from polytopes.checks import real_array
 from polytopes.hpolytope import HPolytope
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,7 @@ def to_halfspaces(P: HPolytope) -> Floats:
 
 def from_halfspaces(halfspaces: ArrayLike) -> HPolytope:
     """Set of rows ``[A, -b]``, the inverse of `to_halfspaces`; also takes `ConvexHull.equations`."""
-    rows = as_array("halfspaces", halfspaces, 2)
+    rows = real_array("halfspaces", halfspaces, ("m", "n + 1"))
     return HPolytope(rows[:, :-1], -rows[:, -1])
 
 

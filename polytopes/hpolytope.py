@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import combinations, containment, plotting, projection, reduction, sampling
 from polytopes import support as support_functions
 from polytopes.affine_hull import affine_dim
+from polytopes.checks import different_coordinates, real_array, real_number, whole_number
 from polytopes.emptiness import Emptiness
-from polytopes.errors import as_array, as_matrix, as_tolerance, as_vector
 from polytopes.generators import Generators, generators, rows_of_generators
 from polytopes.hull import rows_of_points
 from polytopes.inner_box import inner_box
@@ -56,10 +56,8 @@ class HPolytope(Rows):
         lower, upper : array_like (n,)
             A lower bound above its upper bound gives the empty set.
         """
-        low = as_array("lower", lower, 1, finite=False)
-        high = as_array("upper", upper, 1, finite=False)
-        if low.shape != high.shape:
-            raise ValueError(f"upper has shape {high.shape}; expected {low.shape}, the shape of lower.")
+        low = real_array("lower", lower, ("n",), finite=False)
+        high = real_array("upper", upper, low.shape, meaning="the shape of lower", finite=False)
         if np.isposinf(low).any() or np.isneginf(high).any():
             raise ValueError("lower is +inf or upper is -inf somewhere; expected -inf, +inf or a finite bound.")
         axes = np.eye(low.size)
@@ -73,31 +71,33 @@ class HPolytope(Rows):
         Qhull, in scaled coordinates.  Points and rays within 1e-12 of their spread of a subspace give explicit
         equalities.
         """
-        points = as_array("V", V, 2)
+        points = real_array("V", V, ("k", "n"))
         if 0 in points.shape:
             raise ValueError(f"V has shape {points.shape}; expected one or more points (none: HPolytope.empty).")
-        cone = np.empty((0, points.shape[1])) if rays is None else as_matrix("rays", rays, points.shape[1])
+        n = points.shape[1]
+        cone = np.empty((0, n)) if rays is None else real_array("rays", rays, ("r", n), meaning="as many columns as V")
         return cls(*(rows_of_generators(points, cone) if len(cone) else rows_of_points(points)))
 
     @classmethod
     def empty(cls, n: int) -> Self:
         """The empty set of R^n, as ``0'x <= -1``."""
-        return cls(np.zeros((1, n)), [-1.0])
+        return cls(np.zeros((1, whole_number("n", n, least=1))), [-1.0])
 
     @classmethod
     def whole_space(cls, n: int) -> Self:
         """R^n: no rows."""
-        return cls(np.empty((0, n)), np.empty(0))
+        return cls(np.empty((0, whole_number("n", n, least=1))), np.empty(0))
 
     @classmethod
     def simplex(cls, n: int) -> Self:
         """``{x >= 0, x_1 + ... + x_n <= 1}``."""
+        n = whole_number("n", n, least=1)
         return cls(np.vstack([-np.eye(n), np.ones((1, n))]), np.append(np.zeros(n), 1.0))
 
     @classmethod
     def cross_polytope(cls, n: int) -> Self:
         """``{|x_1| + ... + |x_n| <= 1}``, 2^n rows."""
-        signs = np.array(list(itertools.product([1.0, -1.0], repeat=n)))
+        signs = np.array(list(itertools.product([1.0, -1.0], repeat=whole_number("n", n, least=1))))
         return cls(signs, np.ones(len(signs)))
 
     def __repr__(self) -> str:
@@ -194,18 +194,16 @@ class HPolytope(Rows):
             Nonnegative distance, in the units of x: every half-space and hyperplane may be missed by that much.  The
             test is in floats; with tol = 0 a point on the boundary may go either way.  A set costs one program a row.
         """
-        slack = as_tolerance(tol)
+        slack = real_number("tol", tol, least=0.0)
         if isinstance(x, Rows):
             return containment.contains_set(self, same_space(self, x), slack)
-        points = as_array("x", x, np.ndim(np.asarray(x)))
-        if points.ndim not in (1, 2) or points.shape[-1] != self.dim:
-            raise ValueError(f"x has shape {points.shape}; expected ({self.dim},) or (k, {self.dim}).")
+        points = real_array("x", x, (self.dim,), ("k", self.dim))
         inside = containment.contains_points(self, np.atleast_2d(points), slack)
         return bool(inside[0]) if points.ndim == 1 else inside
 
     def equals(self, Q: Rows, tol: float = 1e-9) -> bool:
         """Whether each set contains the other within `tol` (see `contains`)."""
-        return containment.equal_sets(self, same_space(self, Q), as_tolerance(tol))
+        return containment.equal_sets(self, same_space(self, Q), real_number("tol", tol, least=0.0))
 
     def vertices(self) -> Floats:
         """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
@@ -244,7 +242,9 @@ class HPolytope(Rows):
         EmptySetError, UnboundedError
             If there are no points, or no uniform distribution on them.
         """
-        return sampling.random_points(self, count, rng)
+        if not isinstance(rng, np.random.Generator):
+            raise TypeError(f"rng is a {type(rng).__name__}; expected a numpy.random.Generator: default_rng(seed).")
+        return sampling.random_points(self, whole_number("count", count, least=0), rng)
 
     # other sets from this one
 
@@ -278,10 +278,8 @@ class HPolytope(Rows):
         t : array_like (n,), optional
             Zero if absent.
         """
-        matrix = as_array("M", M, 2)
-        if matrix.shape[0] != self.dim:
-            raise ValueError(f"M has shape {matrix.shape}; expected {self.dim} rows, the dimension of the set.")
-        shift = np.zeros(self.dim) if t is None else as_vector("t", t, self.dim)
+        matrix = real_array("M", M, (self.dim, "k"), meaning="one row per coordinate of the set")
+        shift = np.zeros(self.dim) if t is None else real_array("t", t, (self.dim,))
         return type(self)(self.A @ matrix, self.b - self.A @ shift, self.C @ matrix, self.d - self.C @ shift)
 
     def affine_map(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
@@ -295,8 +293,10 @@ class HPolytope(Rows):
         t : array_like (p,), optional
             Zero if absent.
         """
-        matrix = as_matrix("M", M, self.dim)
-        shift = np.zeros(len(matrix)) if t is None else as_vector("t", t, len(matrix))
+        matrix = real_array("M", M, ("p", self.dim), meaning="one column per coordinate of the set")
+        shift = (
+            np.zeros(len(matrix)) if t is None else real_array("t", t, (len(matrix),), meaning="one entry per row of M")
+        )
         return type(self)(*combinations.affine_image(self, matrix, shift))
 
     def minkowski_sum(self, Q: Rows) -> Self:
@@ -313,9 +313,7 @@ class HPolytope(Rows):
         """
         return type(self)(*combinations.pontryagin_difference(self, same_space(self, Q)))
 
-    def project(
-        self, keep: Sequence[int], method: str = "auto", max_rows: int = 20_000, outer: bool = False
-    ) -> Self:
+    def project(self, keep: Sequence[int], method: str = "auto", max_rows: int = 20_000, outer: bool = False) -> Self:
         """Projection ``{x_keep : x in P}``, exact, on the coordinates `keep` in their order.
 
         Equalities are solved for the other coordinates first, in rationals.
@@ -343,12 +341,11 @@ class HPolytope(Rows):
         UndecidedError
             If a hull was asked for and the set is too thin for one in floats.
         """
-        kept = [int(j) for j in keep]
-        if not kept or len(set(kept)) != len(kept) or not all(0 <= j < self.dim for j in kept):
-            raise ValueError(f"keep is {list(keep)}; expected different coordinates below {self.dim}, at least one.")
+        kept = different_coordinates("keep", keep, self.dim)
         if method not in projection.METHODS:
             raise ValueError(f"method is {method!r}; expected one of {', '.join(projection.METHODS)}.")
-        return type(self)(*projection.project(self, kept, method, max_rows, outer))
+        limit = whole_number("max_rows", max_rows, least=1)
+        return type(self)(*projection.project(self, kept, method, limit, outer))
 
     def outer_reduce(self, max_facets: int) -> Self:
         """A superset with at most `max_facets` inequalities, bounded if this set is.
@@ -360,10 +357,9 @@ class HPolytope(Rows):
         max_facets : int
             At least twice the dimension.
         """
-        if max_facets < 2 * self.dim:
-            raise ValueError(f"max_facets is {max_facets}; expected at least {2 * self.dim}, twice the dimension.")
+        most = whole_number("max_facets", max_facets, least=2 * self.dim)
         minimal = self.remove_redundancy()
-        return minimal.with_rows(*reduction.reduced_rows(minimal, max_facets))
+        return minimal.with_rows(*reduction.reduced_rows(minimal, most))
 
     def outer_template(self, directions: ArrayLike) -> Self:
         """Smallest set ``{x : T x <= h}`` with the given normals (k, n) that contains this one.
@@ -371,7 +367,7 @@ class HPolytope(Rows):
         Normals along which this set is unbounded are left out; offsets are rounded outward (128 units of last place).
         One program a normal.
         """
-        normals = as_matrix("directions", directions, self.dim)
+        normals = real_array("directions", directions, ("k", self.dim))
         if not support_functions.known_nonempty(self):
             return type(self).empty(self.dim)
         return type(self)(*support_functions.outer_template(self, normals))
@@ -390,7 +386,7 @@ class HPolytope(Rows):
         **style
             Passed to the matplotlib patch.
         """
-        pair = tuple(int(j) for j in dims)
-        if len(pair) not in (2, 3) or len(set(pair)) != len(pair) or not all(0 <= j < self.dim for j in pair):
-            raise ValueError(f"dims is {tuple(dims)}; expected two or three different coordinates below {self.dim}.")
-        return plotting.plot(self, ax, pair, style)
+        axes = tuple(different_coordinates("dims", dims, self.dim))
+        if len(axes) not in (2, 3):
+            raise ValueError(f"dims is {axes}; expected two or three coordinates.")
+        return plotting.plot(self, ax, axes, style)

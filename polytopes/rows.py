@@ -7,8 +7,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.checks import real_array
 from polytopes.emptiness import Emptiness, decide_emptiness
-from polytopes.errors import as_array, as_matrix
 from polytopes.linear_program import Program, prepare
 
 Floats = NDArray[np.float64]
@@ -35,22 +35,16 @@ class Rows:
     C: Floats
     d: Floats
 
-    def __init__(
-        self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None
-    ) -> None:
-        rows = as_array("A", A, 2)
+    def __init__(self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None) -> None:
+        rows = real_array("A", A, ("m", "n"))
         m, n = rows.shape
         if n == 0:
             raise ValueError(f"A has shape {rows.shape}; expected at least one column. Use shape (0, n) for no rows.")
-        rhs = as_array("b", b, 1)
-        if rhs.size != m:
-            raise ValueError(f"b has shape {rhs.shape}; expected ({m},), one entry per row of A.")
+        rhs = real_array("b", b, (m,), meaning="one entry per row of A")
         if (C is None) != (d is None):
             raise ValueError("C and d must be given together: the equalities are C x = d.")
-        fixed = np.empty((0, n)) if C is None else as_matrix("C", C, n)
-        values = np.empty(0) if d is None else as_array("d", d, 1)
-        if values.size != fixed.shape[0]:
-            raise ValueError(f"d has shape {values.shape}; expected ({fixed.shape[0]},), one entry per row of C.")
+        fixed = np.empty((0, n)) if C is None else real_array("C", C, ("q", n), meaning="one column per column of A")
+        values = np.empty(0) if d is None else real_array("d", d, (len(fixed),), meaning="one entry per row of C")
         for name, array in zip("AbCd", (rows, rhs, fixed, values), strict=True):
             array.flags.writeable = False
             object.__setattr__(self, name, array)

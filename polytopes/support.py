@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes.errors import EmptySetError, UndecidedError, as_array
+from polytopes.checks import real_array
+from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.linear_program import UNDECIDED, Maxima
 from polytopes.rows import Rows
 
@@ -76,11 +77,7 @@ def maxima(P: Rows, directions: Floats) -> Maxima | None:
 
 
 def _directions(P: Rows, directions: ArrayLike) -> Floats:
-    raw = np.asarray(directions)
-    array = as_array("directions", directions, 1 if raw.ndim == 1 else 2)
-    if array.shape[-1] != P.dim:
-        raise ValueError(f"directions has shape {array.shape}; expected ({P.dim},) or (k, {P.dim}).")
-    return array
+    return real_array("directions", directions, (P.dim,), ("k", P.dim))
 
 
 def support(P: Rows, directions: ArrayLike) -> float | Floats:

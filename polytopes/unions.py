@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import combinations
-from polytopes.errors import as_matrix
+from polytopes.checks import real_array
 from polytopes.hpolytope import HPolytope
 from polytopes.rows import same_space
 from polytopes.support import known_nonempty, outer_offsets
@@ -41,7 +41,9 @@ def union_bounds(sets: Sequence[HPolytope], directions: ArrayLike | None = None)
         The normals T; those of a box if absent.
     """
     n = _checked(sets)
-    normals = np.vstack([np.eye(n), -np.eye(n)]) if directions is None else as_matrix("directions", directions, n)
+    normals = (
+        np.vstack([np.eye(n), -np.eye(n)]) if directions is None else real_array("directions", directions, ("k", n))
+    )
     some = [P for P in sets if known_nonempty(P)]
     if not some:
         return HPolytope.empty(n)
