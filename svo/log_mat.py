@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from svo.log import Log
 from svo.log_columns import Array, log_of_columns, wanted_columns
-from svo.mat_file import read_mat
+from svo.mat_file import MatFile
 
 if TYPE_CHECKING:
     from svo.plant import Columns
@@ -41,8 +41,13 @@ def write_mat(path: Path, cells: Mapping[str, Array]) -> None:
 
 def read_mat_log(path: Path, columns: Columns, Ts: float) -> Log:
     """Read a log; errors name the sample and the variable."""
-    variables = read_mat(path)
-    names = wanted_columns(str(path), list(variables), columns)
+    file = MatFile.open(path)
+    needed = (columns.time, *(c.name for c in columns.inputs + columns.outputs))
+    for name, kind in file.kinds.items():
+        if name in needed and kind != "numbers":
+            raise ValueError(f"{path} has no column {name!r} of numbers; the variable of that name is {kind}")
+    names = wanted_columns(str(path), file.numeric, columns)
+    variables = file.read(names)
     samples = variables[columns.time].size
     for name in names:
         shape = variables[name].shape

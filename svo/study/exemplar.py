@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from polytopes import HPolytope
 from svo.detect import verdicts
 from svo.log import Log
+from svo.npz_file import read_npz
 from svo.observers.step import Step
 from svo.plant import Plant, fault_start
 from svo.study.configuration import Job
@@ -89,23 +90,46 @@ class Exemplar:
 
     @classmethod
     def load(cls, path: Path) -> Exemplar:
-        """Read what `save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
-            header = json.loads(str(data["header"]))
-            snapshots = tuple(
-                Snapshot(
-                    s["sample"],
-                    s["event"],
-                    {name: HPolytope(data[f"A_{i}_{j}"], data[f"b_{i}_{j}"]) for j, name in enumerate(s["sets"])},
-                )
-                for i, s in enumerate(header["snapshots"])
-            )
-            arrays = {name: data[name] for name in ("time", "alive", "lower", "upper", "x")}
-        names = tuple(header["names"])
-        return cls(
-            header["fault"], header["profile"], header["noise"], names,
-            snapshots=snapshots, architecture=header["architecture"], **arrays,
-        )  # fmt: skip
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        ValueError
+            If the file is damaged, is something else, or unpacks to more than `svo.unpacking` allows.
+        """
+        data = read_npz(path)
+        try:
+            return _decode(data)
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise ValueError(f"{path} holds no samples of a run ({type(error).__name__}: {error})") from error
+
+
+def _decode(data: Mapping[str, NDArray[Any]]) -> Exemplar:
+    header = json.loads(str(data["header"]))
+    names = tuple(map(str, header["names"]))
+    arrays = {name: data[name] for name in ("time", "alive", "lower", "upper", "x")}
+    if arrays["x"].ndim != 2:
+        raise ValueError(f"x has the shape {arrays['x'].shape}; expected (samples, states)")
+    samples, states = arrays["x"].shape
+    shapes = {"time": (samples,), "alive": (samples, len(names)), "x": (samples, states)}
+    shapes |= dict.fromkeys(("lower", "upper"), (samples, len(names), states))
+    for name, array in arrays.items():
+        if array.shape != shapes[name] or array.dtype != (bool if name == "alive" else float):
+            raise ValueError(f"{name} has the shape {array.shape} and type {array.dtype}; expected {shapes[name]}")
+    snapshots = tuple(
+        Snapshot(
+            int(s["sample"]),
+            str(s["event"]),
+            {str(name): HPolytope(data[f"A_{i}_{j}"], data[f"b_{i}_{j}"]) for j, name in enumerate(s["sets"])},
+        )
+        for i, s in enumerate(header["snapshots"])
+    )
+    if any(not 0 <= s.sample < samples or not set(s.sets) <= set(names) for s in snapshots):
+        raise ValueError("a snapshot is not one of this run")
+    fault, profile, noise = (str(header[name]) for name in ("fault", "profile", "noise"))
+    return Exemplar(
+        fault, profile, noise, names, snapshots=snapshots, architecture=header["architecture"], **arrays
+    )  # fmt: skip
 
 
 def planar_outline(step: Step) -> HPolytope:

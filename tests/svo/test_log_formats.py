@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -205,3 +206,43 @@ def test_a_package_that_is_not_installed_is_named_with_its_extra(
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ImportError, match=rf"need {package}, which is not installed.*svo-fdi\[{extra}\]"):
         use[package]()
+
+
+def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = 100_000
+    cells = {**{name: np.zeros(rows) for name in GOOD}, "time_s": np.arange(rows) * 0.1}
+    pd.DataFrame(cells).drop(columns="time_s").assign(time_s=0).to_parquet(tmp_path / "log.parquet")
+    assert (tmp_path / "log.parquet").stat().st_size < 100_000
+    monkeypatch.setenv("SVO_UNPACK_LIMIT_MB", "3")
+    with pytest.raises(ValueError, match=r"would unpack to 3 MB; the limit is 3 MB.*SVO_UNPACK_LIMIT_MB to 4"):
+        read_log(tmp_path / "log.parquet", COLUMNS, 0.1)
+
+
+def test_a_damaged_table_is_one_clear_error_or_still_a_log(tmp_path: Path) -> None:
+    path, rng, errors = tmp_path / "log.parquet", random.Random(0), []
+    pd.DataFrame(GOOD).to_parquet(path)
+    content = path.read_bytes()
+    for case in range(300):
+        changed = bytearray(content)
+        at = rng.randrange(len(changed))
+        if case % 4 == 0:
+            del changed[at:]
+        else:
+            changed[at] = rng.choice([changed[at] ^ 1 << rng.randrange(8), 0, 127, 255])
+        path.write_bytes(bytes(changed))
+        try:
+            assert len(read_log(path, COLUMNS, 0.1)) == 3
+        except ValueError as error:
+            errors.append(str(error))
+    assert len(errors) > 100
+    assert all(error.startswith(str(path)) for error in errors)
+
+
+def test_a_changed_number_in_a_table_that_was_written_here_is_found(tmp_path: Path) -> None:
+    log = Log(time=[0.0, 0.1], u=[[1.0], [1.0]], y=[[2.0, 3.0], [2.0, 3.5]])
+    write_log(tmp_path / "log.parquet", log, COLUMNS)
+    content = (tmp_path / "log.parquet").read_bytes()
+    at = content.index(np.array([3.0, 3.5]).tobytes())
+    (tmp_path / "log.parquet").write_bytes(content[:at] + b"\1" + content[at + 1 :])
+    with pytest.raises(ValueError, match="is damaged or cut off"):
+        read_log(tmp_path / "log.parquet", COLUMNS, 0.1)
