@@ -10,10 +10,10 @@ Engineering Practice 21 (2013), equations (1) and (8), are the case without a, c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from svo.along_log import along
 from svo.checks import finite_array
-from svo.discretisation import discretise
 from svo.log import Log
 from svo.model_bounds import Bounds, bounds_of
 from svo.model_file import read_arrays
@@ -29,6 +28,9 @@ from svo.simulation import simulate
 from svo.stack import OUTPUT_BLOCKS, STATE_BLOCKS, Layout, ScheduledBlock, Stack
 from svo.state_space import state_space
 from svo.uncertainty import Schedulable, Uncertainty
+
+if TYPE_CHECKING:
+    from svo.origin import Origin
 
 __all__ = ["UncertainModel", "Uncertainty"]
 
@@ -58,6 +60,8 @@ class UncertainModel:
     uncertainties : sequence of Uncertainty
     schedule : optional
         A typical scheduling value. Needed if any array or bound is a function: shapes are checked with it.
+    origin : optional
+        The continuous plant behind the model, which `from_continuous` sets; faults are stated in its time.
 
     Raises
     ------
@@ -79,6 +83,7 @@ class UncertainModel:
     names: Mapping[str, Sequence[str]] | None = None
     uncertainties: Sequence[Uncertainty] = ()
     schedule: Any = None
+    origin: Origin | None = field(default=None, repr=False)
     layout: Layout = field(init=False, repr=False)
     _stack: Stack = field(init=False, repr=False)
     _bounds: Bounds = field(init=False, repr=False)
@@ -193,8 +198,17 @@ class UncertainModel:
         return value[:, 0] if name in "ac" else value
 
     def replace(self, **changes: Any) -> UncertainModel:
-        """A copy with some arguments changed, checked again."""
+        """A copy with some arguments changed, checked again; arrays are those of discrete time."""
+        if self.origin is not None:
+            changes = {"origin": self.origin.after(changes)} | changes
         return replace(self, **changes)
+
+    def in_given_time(self, change: Callable[[UncertainModel], UncertainModel]) -> UncertainModel:
+        """The model after a change of its arrays in the time in which it was given, as faults state it.
+
+        A model of `from_continuous` is changed in continuous time and discretised again, any other as it is.
+        """
+        return change(self) if self.origin is None else self.origin.changed(change)
 
     # -- construction from other forms -----------------------------------------------------------
 
@@ -206,23 +220,44 @@ class UncertainModel:
         C: ArrayLike,
         *,
         Ts: float,
-        E: ArrayLike | None = None,
-        a: ArrayLike | None = None,
-        uncertainties: Sequence[Uncertainty] = (),
-        remainder: ArrayLike | None = None,
-        w: Any = None,
-        F: ArrayLike | None = None,
+        remainder: ArrayLike | Mapping[str, ArrayLike] | None = None,
+        varying: str | Sequence[str] = (),
         **rest: Any,
     ) -> UncertainModel:
-        """Zero-order-hold discretisation of dx/dt = A x + B u + a + E w, inputs held over a sample.
+        """Discretisation of dx/dt = A x + B u + a + E w + sum_i Delta_i (A_i x + B_i u + a_i + E_i w).
 
-        A, B, a and E are discretised exactly. The exponential of an uncertain matrix is not affine in
-        Delta, so each uncertainty keeps the directions Gamma [A_i B_i a_i E_i], Gamma = int_0^Ts exp(A t) dt,
-        as if x were held over the sample; ``remainder`` (n,) bounds what that leaves out, per sample, and
-        enters as n more disturbances. It is required when an uncertainty touches the state equation.
+        Inputs are held over a sample, and so is each w and each Delta that ``varying`` does not name: it changes at
+        the samples only (a square wave inside a sample breaks that, and a healthy plant may then be falsified). A
+        fault begins at a sample too, unless its Delta varies.
+
+        A, B, a and E are discretised exactly (zero-order hold). The exponential of an uncertain matrix is not affine
+        in Delta, so each uncertainty keeps the directions Gamma [A_i B_i a_i E_i], Gamma = int_0^Ts exp(A t) dt, as
+        if x were held over the sample. What that leaves out, and what varies inside the sample beside its mean there,
+        enters as n more disturbances with proven bounds (`svo.discretisation`). Where the output depends on a w or
+        Delta that varies, its value at the sample and its mean are two numbers.
+
+        Parameters
+        ----------
+        A, B, C, and the other arguments of `UncertainModel`
+            Those of the state equation in continuous time, and constant.
+        Ts : float
+            Sampling time [s].
+        remainder : {"states": (n,), "inputs": (nu,)} or (n,) array
+            Largest |x| at any time and largest |u|, in healthy and faulty operation, from which the bounds of what the
+            uncertainties leave out are computed; or these bounds, per sample. Needed if an uncertainty has an A, or
+            varies.
+        varying : str or sequence of str
+            What varies inside a sample, within its bounds: "all", "w" or "Delta" (all of them), "w[0]", "Delta[1]", or
+            names of disturbances and uncertainties. "all" and "Delta" hold for the Delta of a fault too.
+
+        Raises
+        ------
+        TypeError, ValueError
+            Naming the array, its shape and the expected one, or the ``remainder`` that is missing.
         """
-        discrete = discretise(A, B, E=E, a=a, F=F, w=w, uncertainties=uncertainties, remainder=remainder, Ts=Ts)
-        return cls(C=C, Ts=Ts, **discrete, **rest)
+        from svo.origin import Origin
+
+        return Origin.of({"A": A, "B": B, "C": C, "Ts": Ts} | rest, remainder, varying).model()
 
     @classmethod
     def from_statespace(cls, sys: Any, *, Ts: float | None = None, **rest: Any) -> UncertainModel:

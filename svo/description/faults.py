@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from svo.description.model import ARRAYS, arrays_of
+from svo.description.model import ARRAYS, arrays_of, remainder_of
 from svo.description.table import Table
 from svo.faults import ActuatorFault, PlantFault, SensorFault, Step
 from svo.isolation.logic import GLOBAL, NOMINAL
@@ -16,8 +16,8 @@ from svo.uncertainty import Uncertainty
 _KNOWN = {
     "sensor": ("output", "kind", "magnitude"),
     "actuator": ("input", "kind", "magnitude", "travel", "frequency_hz"),
-    "plant": (*ARRAYS, "magnitude"),
-    "model": (*ARRAYS, "n", "w", "contains_nominal"),
+    "plant": (*ARRAYS, "magnitude", "remainder"),
+    "model": (*ARRAYS, "n", "w", "contains_nominal", "remainder"),
 }
 
 
@@ -41,15 +41,33 @@ def faults_of(top: Table, nominal: UncertainModel, names: Mapping[str, Sequence[
 def _fault_model(table: Table, nominal: UncertainModel, names: Mapping[str, Sequence[str]]) -> FaultModel:
     kind = table.text("type", choices=tuple(_KNOWN))
     table.check_keys(("type", *_KNOWN[kind]))
+    remainder = _own_remainder(table, nominal)
     if kind == "model":
         arrays = arrays_of(table)
         if not arrays:
             raise table.error(None, f"is the nominal model; expected at least one of {', '.join(_KNOWN['model'])}")
         with table.errors():
-            return FaultModel(nominal.replace(**arrays), table.truth("contains_nominal", False))
+            model = _in_time_of(nominal, lambda plant: plant.replace(**arrays), remainder)
+            return FaultModel(model, table.truth("contains_nominal", False))
     with table.errors():
-        fault = _fault(table, kind, names)
-        return FaultModel(fault.model(nominal), contains_nominal=True)
+        return FaultModel(_in_time_of(nominal, _fault(table, kind, names).model, remainder), contains_nominal=True)
+
+
+def _own_remainder(table: Table, nominal: UncertainModel) -> Any:
+    if "remainder" not in table:
+        return None
+    if nominal.origin is None:
+        raise table.error(
+            "remainder", "has no meaning for a discrete model; drop it, or say continuous = true in [model]"
+        )
+    return remainder_of(table)
+
+
+def _in_time_of(
+    nominal: UncertainModel, change: Callable[[UncertainModel], UncertainModel], remainder: Any
+) -> UncertainModel:
+    """A fault's arrays are in the same time as those of [model]."""
+    return change(nominal) if nominal.origin is None else nominal.origin.changed(change, remainder)
 
 
 def _fault(table: Table, kind: str, names: Mapping[str, Sequence[str]]) -> ActuatorFault | PlantFault | SensorFault:

@@ -10,14 +10,13 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.description.table import Table
-from svo.discretisation import remainder_bound
 from svo.model import UncertainModel
 from svo.model_file import read_arrays
 from svo.uncertainty import Uncertainty
 
 ARRAYS = ("A", "B", "a", "E", "C", "D", "c", "F")
 BOUNDS = ("n", "w")
-_MODEL = (*ARRAYS, *BOUNDS, "continuous", "remainder", "file", "uncertainties")
+_MODEL = (*ARRAYS, *BOUNDS, "continuous", "remainder", "varying", "file", "uncertainties")
 _UNCERTAINTY = (*ARRAYS, "bounds", "name")
 
 
@@ -31,10 +30,13 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
     uncertainties = [_uncertainty(entry) for entry in table.tables("uncertainties", _UNCERTAINTY)]
     rest: dict[str, Any] = {"Ts": top.number("Ts"), "uncertainties": uncertainties}
     continuous = table.truth("continuous", False)
-    if not continuous and "remainder" in table:
-        raise table.error("remainder", "has no meaning for a discrete model; drop it, or say continuous = true")
+    for key in ("remainder", "varying"):
+        if not continuous and key in table:
+            raise table.error(key, "has no meaning for a discrete model; drop it, or say continuous = true")
     if "remainder" in table:
-        rest["remainder"] = _remainder(table, arrays, rest)
+        rest["remainder"] = remainder_of(table)
+    if "varying" in table:
+        rest["varying"] = table.content["varying"]
     if "n" not in arrays:
         # Taken as zero, a bound that was forgotten falsifies the plant at its first noisy sample.
         raise table.error(
@@ -54,15 +56,12 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
     return model.replace(names=names)
 
 
-def _remainder(table: Table, arrays: Mapping[str, Any], rest: Mapping[str, Any]) -> Any:
-    """As given, or computed from bounds of the states and inputs."""
+def remainder_of(table: Table) -> Any:
+    """Bounds of what the discretisation leaves out, or of the states and inputs that they are computed from."""
     if not isinstance(table.content["remainder"], dict):
         return table.array("remainder")
     reach = table.table("remainder", ("states", "inputs"))
-    x, u = reach.array("states"), reach.array("inputs") if "inputs" in reach else None
-    continuous = {name: arrays.get(name) for name in ("A", "B", "E", "a", "w")}
-    with reach.errors():
-        return remainder_bound(**continuous, **rest, x=x, u=u)  # type: ignore[arg-type]
+    return {"states": reach.array("states")} | ({"inputs": reach.array("inputs")} if "inputs" in reach else {})
 
 
 def arrays_of(table: Table) -> dict[str, Any]:

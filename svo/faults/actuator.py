@@ -212,6 +212,9 @@ class ActuatorFault:
 
     def model(self, nominal: UncertainModel) -> UncertainModel:
         """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+        return nominal.in_given_time(self._model)
+
+    def _model(self, nominal: UncertainModel) -> UncertainModel:
         check_channels(channels(self.where), nominal.n_inputs, "inputs in the model")
         if self.kind in _NEEDS_TRAVEL:
             assert self.travel is not None

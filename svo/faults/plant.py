@@ -24,6 +24,9 @@ class PlantFault:
     The observer's model lets that Delta be anything between 0 and ``magnitude``, free to change at each
     sample; so it contains the nominal plant and every intermediate size. It is the last Uncertainty.
 
+    All this is in the time in which the model was given: for a model of `UncertainModel.from_continuous` the direction
+    is one of dx/dt, and discretised with it. The fault then begins at a sample, unless its Delta is said to vary.
+
     Parameters
     ----------
     direction : Uncertainty
@@ -51,6 +54,9 @@ class PlantFault:
 
     def model(self, nominal: UncertainModel) -> UncertainModel:
         """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+        return nominal.in_given_time(self._model)
+
+    def _model(self, nominal: UncertainModel) -> UncertainModel:
         bounds = (min(0.0, self.magnitude), max(0.0, self.magnitude))
         named = replace(self.direction, bounds=bounds, name=self.direction.name or "plant fault")
         return nominal.replace(uncertainties=[*nominal.uncertainties, named])
@@ -59,6 +65,8 @@ class PlantFault:
         self, nominal: UncertainModel, t: float, x: ArrayLike, u: ArrayLike, w: ArrayLike, schedule: Any = None
     ) -> tuple[Array, Array]:
         """What the fault adds to x(k+1) (n,) and to y(k) (ny,) at time t [s] of sample k.
+
+        For a model of `UncertainModel.from_continuous` to first order: the rest is within the remainder of `model`.
 
         Parameters
         ----------
@@ -69,12 +77,14 @@ class PlantFault:
         schedule : optional
             Scheduling value of sample k.
         """
+        direction = self.direction if nominal.origin is None else nominal.origin.direction(self.direction)
         total = np.zeros(nominal.layout.shape)
         for name in "ABaECDcF":
-            value = getattr(self.direction, name)
+            value = getattr(direction, name)
             if value is not None:
                 rows, columns = nominal.layout.block(name)
                 block = np.asarray(value(schedule) if callable(value) else value, dtype=float)
-                total[rows, columns] = block[:, None] if block.ndim == 1 else block
+                block = block[:, None] if block.ndim == 1 else block
+                total[rows, columns][:, : block.shape[1]] = block  # a remainder has columns after those of w
         change = float(self.delta(t)) * (total @ np.concatenate([x, u, [1.0], w]))
         return change[: nominal.n_states], change[nominal.n_states :]

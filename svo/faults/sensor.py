@@ -114,6 +114,9 @@ class SensorFault:
 
     def model(self, nominal: UncertainModel) -> UncertainModel:
         """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+        return nominal.in_given_time(self._model)
+
+    def _model(self, nominal: UncertainModel) -> UncertainModel:
         where = channels(self.where)
         check_channels(where, nominal.n_outputs, "outputs in the model")
         if self.kind in ("bias", "drift"):

@@ -67,8 +67,8 @@ def test_the_computed_remainder_is_attained_to_first_order() -> None:
         ({"x": [1.0, 2.0]}, r"x is .*; expected the largest absolute values, shape \(1,\)"),
         ({"u": [-1.0]}, "u is .*; expected the largest absolute values"),
         ({"u": None}, r"u is \[\]; expected the largest absolute values, shape \(1,\)"),
-        ({"E": [[1.0]]}, "w is missing: E has 1 columns"),
-        ({"uncertainties": [Uncertainty(A=lambda s: [[s]])]}, "an array of an uncertainty is a function"),
+        ({"E": [[1.0]]}, "w is missing: E or F has 1 columns"),
+        ({"uncertainties": [Uncertainty(A=lambda s: [[s]])]}, "A of an uncertainty is a function"),
         ({"uncertainties": [Uncertainty(A=np.eye(2), name="q")]}, r"A of uncertainty q has shape \(2, 2\)"),
     ],
 )

@@ -239,9 +239,9 @@ def test_what_the_first_order_leaves_out_is_within_the_remainder() -> None:
         ({"uncertainties": [Uncertainty(A=lambda s: s)], "remainder": 0.1}, "A of an uncertainty is a function"),
         ({"remainder": [0.1, -0.1]}, "remainder is"),
         ({"remainder": [0.1]}, r"remainder is .*expected bounds >= 0 of shape \(2,\)"),
-        ({"E": [[1.0], [0.0]], "remainder": 0.1}, "w is missing: E has 1 columns"),
+        ({"E": [[1.0], [0.0]], "remainder": 0.1}, "w is missing: E or F has 1 columns"),
         ({"E": [[1.0], [0.0]], "w": HPolytope.box([0.0], [1.0]), "remainder": 0.1}, "w is a polytope or a function"),
-        ({"E": [[1.0], [0.0]], "w": [1.0, 2.0], "remainder": 0.1}, r"w has a bound of shape \(2,\); expected \(1,\)"),
+        ({"E": [[1.0], [0.0]], "w": [1.0, 2.0], "remainder": 0.1}, r"w has bounds of shapes \(2,\)"),
     ],
 )
 def test_mistakes_in_continuous_time_are_named(changes: dict[str, Any], message: str) -> None:

@@ -184,10 +184,13 @@ ERRORS: list[tuple[tuple[str, str], list[str]]] = [
     (('name = "force"', 'name = "position"'), ["[columns]", "'position' more than once"]),
     (("[{ name = \"force\", unit = \"N\" }]", '["force"]'), ["[columns], key 'inputs'", "expected a list of tables"]),
     (('name = "force"', 'name = "a", unit = "N" }, { name = "b"'), ["[columns], key 'inputs': names 2 columns"]),
-    (("n = [0.05]", "n = [0.05]\ncontinuous = true"), ["[model]: remainder is missing", "{states = [...], inputs"]),
+    (
+        ("n = [0.05]", 'n = [0.05]\ncontinuous = true\nvarying = "mass"'),
+        ["[model]: remainder is missing", "{'states': ..., 'inputs'"],
+    ),
     (
         ("n = [0.05]", "n = [0.05]\ncontinuous = true\nremainder = { states = [1.0], inputs = [2.0] }"),
-        ["[model.remainder]: x is", "shape (2,)"],
+        ["[model]: remainder['states'] is", "shape (2,)"],
     ),
     (("n = [0.05]", "continuous = true\nremainder = { inputs = [2.0] }"), ["[model.remainder], key 'states'"]),
 ]  # fmt: skip
