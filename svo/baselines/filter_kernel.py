@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+_IMPOSSIBLE = 1e300  # half a squared innovation, in variances: so far off that only floats end there
 
 @njit(cache=True)
 def filter_samples(x, P, first, A, f, Q, C, g, R, y, E, D, states, white):  # type: ignore[no-untyped-def]
@@ -30,6 +31,10 @@ def filter_samples(x, P, first, A, f, Q, C, g, R, y, E, D, states, white):  # ty
         if E.shape[2]:
             state = np.zeros_like(E[k]) if start else E[k].copy()
             G = np.linalg.solve(L, Ck @ state + _measured(D[k], y[k]))
+            for j in range(G.shape[1]):  # the size of an unknown input is free, so each is one that is seen alike
+                scale = 2.0 ** -np.floor(np.log2(max(np.max(np.abs(G[:, j])), 1e-300)))
+                G[:, j] *= scale
+                state[:, j] *= scale
             normal = G.T @ G
             if start:  # an input of the state has not acted yet
                 for j in range(len(normal)):
@@ -40,25 +45,23 @@ def filter_samples(x, P, first, A, f, Q, C, g, R, y, E, D, states, white):  # ty
             gain = gain + (state - gain @ G) @ M
             white[k] = w - G @ (M @ w)
         x += gain @ w
-        K = np.ascontiguousarray(np.linalg.solve(np.ascontiguousarray(L.T), np.ascontiguousarray(gain.T)).T)
-        rest = np.eye(x.size) - K @ Ck
-        P[:] = rest @ P @ rest.T + K @ Rk @ K.T
+        P[:] = _corrected(P, gain, L, Ck, Rk)
         states[k] = x
     return -1
 
 
 @njit(cache=True)
-def multiple_models(xs, Ps, mu, first, transition, A, f, Q, C, g, R, y, log_odds, posterior):  # type: ignore[no-untyped-def]
+def multiple_models(xs, Ps, log_mu, first, log_transition, A, f, Q, C, g, R, y, log_odds, posterior):  # type: ignore[no-untyped-def]
     """Interacting multiple models (Blom and Bar-Shalom 1988) over samples.
 
-    xs (m, n), Ps (m, n, n) and mu (m,) as x and P in `filter_samples`; the arrays of the models are (m, K, ...). Writes
-    posterior (K, m) and log_odds (K,): ln of the odds of all models but the first.
+    xs (m, n), Ps (m, n, n) and log_mu (m,) as x and P in `filter_samples`; the arrays of the models are (m, K, ...).
+    Probabilities are kept as logarithms (-inf in log_transition: never), for without switching that of a wrong
+    model falls without end. Writes posterior (K, m) and log_odds (K,): ln of the odds of all models but the first.
     """
     m = len(xs)
     for k in range(len(y)):
         if not (first and k == 0):
-            xs[:], Ps[:], mu[:] = _mixed(xs, Ps, mu, transition)
-        weights = np.empty(m)
+            xs[:], Ps[:], log_mu[:] = _mixed(xs, Ps, log_mu, log_transition)
         for j in range(m):
             if not (first and k == 0):
                 xs[j] = A[j, k] @ xs[j] + f[j, k]
@@ -68,26 +71,46 @@ def multiple_models(xs, Ps, mu, first, transition, A, f, Q, C, g, R, y, log_odds
             w = np.linalg.solve(L, nu)
             gain = np.ascontiguousarray(np.linalg.solve(L, Ck @ Ps[j]).T)
             xs[j] = xs[j] + gain @ w
-            Ps[j] = Ps[j] - gain @ gain.T
-            weights[j] = np.log(mu[j]) - 0.5 * (w @ w) - np.sum(np.log(np.diag(L)))
-        weights -= np.max(weights)
-        log_odds[k] = np.log(np.sum(np.exp(weights[1:] - np.max(weights[1:])))) + np.max(weights[1:]) - weights[0]
-        mu[:] = np.exp(weights) / np.sum(np.exp(weights))
-        posterior[k] = mu
+            Ps[j] = _corrected(Ps[j], gain, L, Ck, Rk)
+            distance = 0.5 * (w @ w)
+            log_mu[j] -= (distance if distance < _IMPOSSIBLE else _IMPOSSIBLE) + np.sum(np.log(np.diag(L)))
+        log_mu -= _log_sum(log_mu)
+        log_odds[k] = _log_sum(log_mu[1:]) - log_mu[0]
+        posterior[k] = np.exp(log_mu)
 
 
 @njit(cache=True)
-def _mixed(xs, Ps, mu, transition):  # type: ignore[no-untyped-def]
-    """Means, covariances and probabilities of the models after a possible switch."""
+def _log_sum(logs):  # type: ignore[no-untyped-def]
+    """ln of the sum of exponentials; -inf if all are."""
+    largest = np.max(logs)
+    return largest + np.log(np.sum(np.exp(logs - largest))) if largest > -np.inf else largest
+
+
+@njit(cache=True)
+def _corrected(P, gain, L, C, R):  # type: ignore[no-untyped-def]
+    """Covariance after a measurement, in Joseph's form, which stays positive; gain is of the whitened innovation."""
+    K = np.ascontiguousarray(np.linalg.solve(np.ascontiguousarray(L.T), np.ascontiguousarray(gain.T)).T)
+    rest = np.eye(len(P)) - K @ C
+    return rest @ P @ rest.T + K @ R @ K.T
+
+
+@njit(cache=True)
+def _mixed(xs, Ps, log_mu, log_transition):  # type: ignore[no-untyped-def]
+    """Means, covariances and log probabilities of the models after a possible switch."""
     m, n = xs.shape
-    predicted = transition.T @ mu
+    predicted = np.empty(m)
     means, covariances = np.zeros((m, n)), np.zeros((m, n, n))
     for j in range(m):
+        joint = log_transition[:, j] + log_mu
+        predicted[j] = _log_sum(joint)
+        share = np.exp(joint - predicted[j])
         for i in range(m):
-            means[j] += transition[i, j] * mu[i] / predicted[j] * xs[i]
+            if share[i] > 0.0:  # a model that is never switched from may have run off to infinity
+                means[j] += share[i] * xs[i]
         for i in range(m):
-            away = xs[i] - means[j]
-            covariances[j] += transition[i, j] * mu[i] / predicted[j] * (Ps[i] + np.outer(away, away))
+            if share[i] > 0.0:
+                away = xs[i] - means[j]
+                covariances[j] += share[i] * (Ps[i] + np.outer(away, away))
     return means, covariances, predicted
 
 

@@ -186,7 +186,7 @@ def unknown_input_exists(A: ArrayLike, C: ArrayLike, E: ArrayLike, D: ArrayLike 
     """
     A, C = finite_array("A", A), finite_array("C", C)
     n, ny = len(A), len(C)
-    E, D = _columns("E", E, n), _columns("D", D, ny)
+    A, C, E, D = _balanced(A, C, _columns("E", E, n), _columns("D", D, ny))
     F = np.hstack([C @ E, D])
     rank = int(np.linalg.matrix_rank(F))
     if rank < F.shape[1]:
@@ -207,6 +207,22 @@ def unknown_input_exists(A: ArrayLike, C: ArrayLike, E: ArrayLike, D: ArrayLike 
                 f"the error has a mode at {_number(value)} that the decoupled outputs do not see; expected all such "
                 "modes inside the unit circle (detectability), so name fewer unknown inputs"
             )
+
+
+def _balanced(A: Array, C: Array, E: Array, D: Array) -> tuple[Array, Array, Array, Array]:
+    """The same system in units in which the sizes of its entries differ least, so that ranks do not depend on units.
+
+    Least squares of ln |entry| = s_row - s_column, rounded to powers of two: states have one scale in both roles.
+    """
+    n, ny, d = len(A), len(C), E.shape[1] + D.shape[1]
+    whole = np.block([[A, E, np.zeros((n, D.shape[1]))], [C, np.zeros((ny, E.shape[1])), D]])
+    i, j = np.nonzero(whole)
+    column = np.where(j < n, j, ny + j)  # scales: of n states, ny outputs, d unknown inputs
+    rows = np.eye(n + ny + d)[i] - np.eye(n + ny + d)[column]
+    scale = np.linalg.lstsq(rows, np.log2(np.abs(whole[i, j])), rcond=None)[0].round()
+    x, y, inputs = 2.0 ** scale[:n], 2.0 ** scale[n : n + ny, None], 2.0 ** scale[n + ny :]
+    e, m = inputs[: E.shape[1]], inputs[E.shape[1] :]
+    return A / x[:, None] * x, C / y * x, E / x[:, None] * e, D / y * m
 
 
 def _columns(name: str, value: ArrayLike | None, rows: int) -> Array:

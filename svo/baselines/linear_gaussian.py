@@ -64,7 +64,8 @@ class GaussianModel:
     Raises
     ------
     ValueError
-        If disturbances enter the output (F, F_i), or the initial set is unbounded or empty.
+        If disturbances enter the output (F, F_i), the initial set is unbounded or empty, or the first measurement is
+        known beforehand without any uncertainty.
     """
 
     model: UncertainModel
@@ -79,7 +80,18 @@ class GaussianModel:
         if not (np.isfinite(lower).all() and np.isfinite(upper).all() and (lower <= upper).all()):
             raise ValueError(f"initial is between {lower} and {upper}; expected a bounded set that is not empty")
         object.__setattr__(self, "mean", (lower + upper) / 2)
-        object.__setattr__(self, "covariance", np.diag(VARIANCE_OF_BOUND * ((upper - lower) / 2) ** 2 + 1e-12))
+        object.__setattr__(self, "covariance", np.diag(VARIANCE_OF_BOUND * ((upper - lower) / 2) ** 2))
+        self._check_innovation()
+
+    def _check_innovation(self) -> None:
+        """Refuse a first measurement without a density: a noise-free sensor of a state that is known exactly."""
+        first = self.sample(np.zeros(self.model.n_inputs), self.model.schedule)
+        silent = np.flatnonzero(np.diag(first.C @ self.covariance @ first.C.T + first.R) <= 0)
+        if silent.size:
+            raise ValueError(
+                f"n is zero for output {silent[0]}, and initial has no width in what it measures; expected noise in "
+                "every output, or a first set that is not flat, for a filter weighs one against the other"
+            )
 
     def sample(self, u: Array, schedule: Any) -> Sample:
         """The model at one sample, driven by u (nu,)."""

@@ -78,9 +78,10 @@ class MultipleModelFilter:
         A, f, Q = (np.array([getattr(s, name)[before] for s in samples]) for name in ("A", "f", "Q"))
         C, g, R = (np.array([getattr(s, name) for s in samples]) for name in ("C", "g", "R"))
         log_odds, posterior = np.empty(K), np.empty((K, m))
-        probability = np.full(m, 1 / m)
+        with np.errstate(divide="ignore"):  # the logarithm of no switching
+            log_transition = np.log(self.transition)
         multiple_models(
-            xs, Ps, probability, True, self.transition, A, f, self.process_noise * Q, C, g, R, samples[0].y,
+            xs, Ps, np.full(m, -np.log(m)), True, log_transition, A, f, self.process_noise * Q, C, g, R, samples[0].y,
             log_odds, posterior,
         )  # fmt: skip
         return ModelProbabilities(tuple(self.models), posterior, log_odds)

@@ -7,8 +7,9 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from svo.comparison.detector import NOBODY, Detection, Detector, Setting
+from svo.comparison.detector import NOBODY, Detector, Setting
 from svo.indices import detection_indices
 from svo.log import Log
 from svo.plant import HEALTHY
@@ -24,7 +25,8 @@ class ComparedRun:
     seed : int
         `with_noise(distribution).simulate(fault, profile, noise, seed)` gives this very run.
     first_alarm_s : float or None
-        From the fault to the first alarm at or after it; the first faulty sample counts as one sampling time.
+        From the fault to the first alarm that begins at or after it; the first faulty sample counts as one sampling
+        time. One that stood before is a false alarm and no detection, however long it stands.
     delay_s : float or None
         From the fault to the last switch from false to true (section 2.4 of the survey). None too if the alarm is
         from before the fault.
@@ -33,7 +35,7 @@ class ComparedRun:
     false_detection_rate, non_detection_rate : float or None
         Shares of time, before and from the fault on.
     isolated_as : str or None
-        The first fault that was named from the fault on.
+        The first fault whose naming began at or after the fault; what was named before tells nothing of it.
     isolation_delay_s : float or None
         To that naming, if it is right.
     microseconds_per_sample : float
@@ -81,10 +83,14 @@ def compare_run(detector: Detector, setting: Setting, log: Log, condition: Condi
         share = float(detection.alarm.mean())
         return ComparedRun(*identity, None, None, bool(detection.alarm.any()), share, None, None, None, cost, width)
     found = detection_indices(log.time, detection.alarm, condition.fault_time)
-    named, naming = _first_naming(detector, detection, log, condition.fault_time)
+    _, alarmed = _first_from(log, np.where(detection.alarm, 0, NOBODY), condition.fault_time)
+    named, naming = None, None
+    if detection.isolated is not None:
+        fault, naming = _first_from(log, detection.isolated, condition.fault_time)
+        named = None if fault == NOBODY else detector.faults[fault]
     return ComparedRun(
         *identity,
-        first_alarm_s=_finite(found.first_alarm),
+        first_alarm_s=alarmed,
         delay_s=_finite(found.delay) if found.delay > 0 else None,
         false_alarm=found.false_alarm,
         false_detection_rate=_finite(found.false_detection_rate),
@@ -96,18 +102,17 @@ def compare_run(detector: Detector, setting: Setting, log: Log, condition: Condi
     )
 
 
-def _first_naming(
-    detector: Detector, detection: Detection, log: Log, fault_time: float
-) -> tuple[str | None, float | None]:
-    """The first fault that is named from the fault on, and when [s after the fault, counted as delays are]."""
-    if detection.isolated is None:
-        return None, None
-    first = detection_indices(log.time, detection.isolated != NOBODY, fault_time).first_alarm
+def _first_from(log: Log, said: NDArray[np.intp], fault_time: float) -> tuple[int, float | None]:
+    """What is said first of all that begins to be said (K,) from the fault on, and when [s, counted as delays are].
+
+    Something begins where the sample before says something else, or nothing.
+    """
+    begins = (said != NOBODY) & (said != np.append(NOBODY, said[:-1]))
+    first = detection_indices(log.time, begins, fault_time).first_alarm
     if not np.isfinite(first):
-        return None, None
+        return NOBODY, None
     Ts = float(log.time[1] - log.time[0])
-    sample = round((fault_time + first - float(log.time[0])) / Ts) - 1
-    return detector.faults[detection.isolated[sample]], first
+    return int(said[round((fault_time + first - float(log.time[0])) / Ts) - 1]), first
 
 
 def _finite(value: float) -> float | None:
