@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from html import escape
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ _DIGITS = 6
 
 
 def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterable[Exemplar]) -> str:
-    """HTML of both views with their data and script; nothing is loaded from elsewhere.
+    """HTML of both views with their data, for the script report.js; nothing is loaded from elsewhere.
 
     Parameters
     ----------
@@ -36,9 +35,8 @@ def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterabl
     data = {"plant": plant.name, "Ts": plant.Ts, "runs": [_run(row) for row in rows], "flights": flights}
     # "<" cannot end the script element from inside a string.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    script = files("svo.study").joinpath("report.js").read_text(encoding="utf-8")
     options = "".join(f'<option value="{i}">{escape(flight["title"])}</option>' for i, flight in enumerate(flights))
-    return _SECTION.format(options=options, data=text, script=script)
+    return _SECTION.format(options=options, data=text)
 
 
 _SECTION = """<h2>Every run</h2>
@@ -58,9 +56,7 @@ is falsified and disappears.</p>
 <div class="scroll"><svg id="sets" role="img" aria-describedby="sample"
 aria-label="Bounds of two states by each model, and which models are alive when"></svg></div>
 <p id="sample" class="readout" aria-live="off">&nbsp;</p>
-<script id="data" type="application/json">{data}</script>
-<script>
-{script}</script>"""
+<script id="data" type="application/json">{data}</script>"""
 
 
 def _run(row: RunRow) -> dict[str, Any]:

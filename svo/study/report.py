@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -80,23 +81,39 @@ def write_report(
         html_facts("Configuration", configuration),
         html_facts("Versions", identity["versions"]),
     ]
-    write_page(path, f"Isolation-time study: {plant.title}", parts)
+    script = _own("report.js") if interactive else ""
+    write_page(path, f"Isolation-time study: {plant.title}", parts, script)
 
 
-def write_page(path: Path, title: str, parts: Iterable[str]) -> None:
-    """Write pieces of HTML as one page with the reports' style inside."""
-    style = files("svo.study").joinpath("report.css").read_text(encoding="utf-8")
-    write_text(path, _PAGE.format(title=escape(title), style=style, body="\n".join(parts)))
+def write_page(path: Path, title: str, parts: Iterable[str], script: str = "") -> None:
+    """Write pieces of HTML as one page with the reports' style, and perhaps a script, inside.
+
+    Its policy lets a browser run that script and no other, and load nothing from elsewhere.
+    """
+    style = _own("report.css")
+    allowed = "; ".join(f"{what}-src {_hash(text)}" for what, text in (("style", style), ("script", script)) if text)
+    policy = f"default-src 'none'; img-src data:; {allowed}; base-uri 'none'; form-action 'none'"
+    body = "\n".join([*parts, f"<script>{script}</script>" if script else ""])
+    write_text(path, _PAGE.format(title=escape(title), policy=policy, style=style, body=body))
+
+
+def _own(name: str) -> str:
+    return files("svo.study").joinpath(name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    """As a content security policy names the text of an element."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 _PAGE = """<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
-<style>
-{style}</style>
+<style>{style}</style>
 </head>
 <body>
 {body}

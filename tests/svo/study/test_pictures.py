@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -13,7 +16,7 @@ from svo.plant import Column, Plant, load_plant
 from svo.study import plots
 from svo.study.exemplar import Exemplar, Snapshot
 from svo.study.figures import write_pictures
-from svo.study.report import write_report
+from svo.study.report import write_page, write_report
 from svo.study.run import RunRow
 from svo.study.summary import ConditionSummary, summarise
 
@@ -141,6 +144,20 @@ def test_the_report_is_one_file_that_refers_to_nothing_outside(
     assert "Not isolated, calm noise: leak ramp in 4 of 4 runs; alive at the end: leak, gauge (4)." in text
     for word in ("undecided", "wrong isolation", "&lt;2&gt;", "prefers-color-scheme", "viewport"):
         assert word in text
+
+
+def test_a_page_runs_its_own_script_and_loads_nothing(tmp_path: Path) -> None:
+    write_page(tmp_path / "page.html", "A <page>", ["<p>text</p>"], script="const a = 1 < 2;\n")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="(.*?)">', text)
+    given = dict(part.split(" ", 1) for part in policy.split("; "))
+    assert (given["default-src"], given["img-src"], given["base-uri"]) == ("'none'", "data:", "'none'")
+    for element in ("style", "script"):
+        (inside,) = re.findall(rf"<{element}>(.*?)</{element}>", text, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(inside.encode()).digest()).decode()
+        assert given[f"{element}-src"] == f"'sha256-{digest}'"
+    write_page(tmp_path / "page.html", "A page", [])
+    assert "script" not in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_sets_are_pictured_where_there_are_two_states(
