@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import subprocess
 import sys
 import tarfile
@@ -66,6 +68,20 @@ def test_the_source_archive_builds_by_itself(archives: tuple[Path, Path]) -> Non
     with tarfile.open(archives[0]) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     assert shipped() | {"README.md", "LICENSE", "pyproject.toml"} <= names
+
+
+def test_two_builds_of_one_source_are_equal(tmp_path: Path) -> None:
+    digests = set()
+    for clone in ("one", "two"):
+        home, out = tmp_path / clone, tmp_path / f"dist-{clone}"
+        run("git", "clone", "--quiet", ROOT, home, cwd=tmp_path)
+        for i, path in enumerate(sorted(home.glob("svo/*.py"))):
+            os.utime(path, (i, i if clone == "one" else 2 * i))
+            path.chmod(0o600 if clone == "one" else 0o664)
+        run(sys.executable, "-m", "build", "--outdir", out, home, cwd=tmp_path)
+        digests.add(tuple(hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(out.iterdir())))
+    assert len(digests) == 1
+    assert len(digests.pop()) == 2
 
 
 def test_the_installed_package_works(installed: Path, tmp_path: Path) -> None:
