@@ -6,7 +6,7 @@ in hexadecimal, so that a stored proof is about exactly the numbers that the obs
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -51,7 +51,7 @@ class AlarmKind:
     model_data : callable
         Certificate to what it holds of its model, a `ModelSample` for each sample up to that of the falsification.
     proves : callable
-        Certificate to the words for what a proof that holds has shown.
+        (certificate, sample of the alarm) to the words for what a proof that holds rests on.
     difference : callable
         (certificate, sample, log) to the first way in which the data are not those of the log, or None.
     """
@@ -61,7 +61,7 @@ class AlarmKind:
     encode: Callable[[Any], Any]
     decode: Callable[[Any], Any]
     model_data: Callable[[Any], tuple[ModelSample, ...]]
-    proves: Callable[[Any], str]
+    proves: Callable[[Any, int], str]
     difference: Callable[[Any, int, Log], str | None]
 
 
@@ -101,18 +101,40 @@ def output_difference(k: int, y: Array, u: Array, driven: bool, log: Log) -> str
     return None
 
 
-# -- window observers --------------------------------------------------------------------------------------------
+# -- what every kind may hold -------------------------------------------------------------------------------------
 
-
-_NO_ARRAYS = {"first", "last", "n", "late", "owner", "arrival", "samples"}
+_LARGEST_AT = "largest_at"
 
 
 def _names(kind: type) -> set[str]:
     return {field.name for field in fields(kind)}
 
 
+def _entries(kind: type, record: Any) -> set[str]:
+    """Entries of a record of this kind: that of the largest set is there only where it is a premise."""
+    optional = {_LARGEST_AT} if isinstance(record, Mapping) and _LARGEST_AT not in record else set()
+    return _names(kind) - optional
+
+
+def _largest_at(record: Mapping[str, Any]) -> int | None:
+    return decode_integer(record[_LARGEST_AT]) if _LARGEST_AT in record else None
+
+
+def _started_again(largest_at: int | None, last: int, sample: int) -> str:
+    """The premise of a set that started again; the observer's sample ``last`` is the log's ``sample``."""
+    if largest_at is None:
+        return ""
+    return f", and the largest set at sample {sample - last + largest_at}, where the set started again"
+
+
+# -- window observers --------------------------------------------------------------------------------------------
+
+
+_NO_ARRAYS = {"first", "last", "n", "late", "owner", "arrival", "samples", _LARGEST_AT}
+
+
 def _decode_window(record: Any) -> WindowCertificate:
-    check_keys(record, _names(WindowCertificate))
+    check_keys(record, _entries(WindowCertificate, record))
     if type(record["late"]) is not bool:
         raise TypeError("late is not true or false")
     if not isinstance(record["samples"], list):
@@ -126,8 +148,14 @@ def _decode_window(record: Any) -> WindowCertificate:
         owner=decode_integers(record["owner"]),
         arrival=ArrivalSet(**decode_arrays(record["arrival"], _names(ArrivalSet))),
         samples=tuple(WindowSample(**decode_arrays(sample, _names(WindowSample))) for sample in record["samples"]),
+        largest_at=_largest_at(record),
         **arrays,
     )
+
+
+def _window_proves(c: WindowCertificate, sample: int) -> str:
+    known = "the readings of its window alone" if c.arrival.is_unknown else "the arrival set"
+    return known + _started_again(c.largest_at, c.last, sample)
 
 
 def _window_difference(c: WindowCertificate, last: int, log: Log) -> str | None:
@@ -157,7 +185,7 @@ WINDOW = AlarmKind(
     encode_value,
     _decode_window,
     _window_model,
-    lambda _: "the arrival set",
+    _window_proves,
     _window_difference,
 )
 
@@ -178,7 +206,7 @@ SPLIT = AlarmKind(
     encode_value,
     _decode_split,
     lambda c: _window_model(c.cells[0]),
-    lambda _: "the arrival set",
+    lambda c, sample: _window_proves(c.cells[0], sample),
     _split_difference,
 )
 
@@ -205,7 +233,7 @@ ZONOTOPE = AlarmKind(
     encode_value,
     _decode_zonotope,
     lambda c: _window_model(c.window),
-    lambda _: "the arrival set",
+    lambda c, sample: _window_proves(c.window, sample),
     _zonotope_difference,
 )
 
@@ -220,20 +248,21 @@ def _encode_polytope(c: PolytopeCertificate) -> Any:
 
 
 def _decode_polytope(record: Any) -> PolytopeCertificate:
-    check_keys(record, _names(PolytopeCertificate))
+    check_keys(record, _entries(PolytopeCertificate, record))
     return PolytopeCertificate(
         sample=decode_integer(record["sample"]),
         before=tuple(decode_set(item) for item in record["before"]),
         measurement=decode_set(record["measurement"]),
         multipliers=Certificate.from_dict(record["multipliers"]),
         data=MeasuredOutput(**decode_arrays(record["data"], _names(MeasuredOutput))),
+        largest_at=_largest_at(record),
     )
 
 
-def _polytope_proves(c: PolytopeCertificate) -> str:
+def _polytope_proves(c: PolytopeCertificate, sample: int) -> str:
     assert c.data is not None
     rows = "" if c.data.explains(c.measurement) else ", and the bounds of the uncertain output"
-    return f"the set before the measurement{rows}"
+    return f"the set before the measurement{rows}" + _started_again(c.largest_at, c.sample, sample)
 
 
 def _polytope_difference(c: PolytopeCertificate, last: int, log: Log) -> str | None:

@@ -33,7 +33,8 @@ def encode_value(value: Any) -> Any:
     if isinstance(value, Certificate):
         return value.to_dict()
     if hasattr(type(value), "__dataclass_fields__"):
-        return {f.name: encode_value(getattr(value, f.name)) for f in fields(value)}
+        entries = {f.name: encode_value(getattr(value, f.name)) for f in fields(value)}
+        return {name: entry for name, entry in entries.items() if entry is not None}
     return value
 
 

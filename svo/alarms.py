@@ -148,7 +148,7 @@ def _check(number: int, text: str, log: Log | None, model_difference: ModelDiffe
     except _BadRecord as error:
         return AlarmCheck(number, "?", -1, False, str(error), perf_counter() - begun)
     kind = kind_of(alarm.certificate)
-    proven = f"proven given {kind.proves(alarm.certificate)}"
+    proven = f"proven given {kind.proves(alarm.certificate, alarm.sample)}"
     compared = ", data as in the log"
     if not alarm.certificate.verify():
         wrong: str | None = "the proof does not hold"

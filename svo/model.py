@@ -26,6 +26,7 @@ from svo.model_bounds import Bounds, bounds_of
 from svo.model_file import read_arrays
 from svo.simulation import simulate
 from svo.stack import OUTPUT_BLOCKS, STATE_BLOCKS, Layout, ScheduledBlock, Stack
+from svo.state_range import StateRange, start_range, state_range
 from svo.state_space import state_space
 from svo.uncertainty import Schedulable, Uncertainty
 
@@ -62,6 +63,18 @@ class UncertainModel:
         A typical scheduling value. Needed if any array or bound is a function: shapes are checked with it.
     origin : optional
         The continuous plant behind the model, which `from_continuous` sets; faults are stated in its time.
+    physical : (lower, upper), optional
+        The state never leaves this range: a promise about the plant at all times, a number or (n,) each, -inf or inf
+        where there is none. Observers cut their sets to it, and every alarm is given it.
+    largest : (lower, upper), optional
+        Bounded. Holds the state at those samples at which an observer that has lost it starts again, after a gap in
+        the measurements; every later alarm is given it, and says so. By default ``physical`` if that is bounded.
+        Without either such an observer is undecided until the readings alone bound the state.
+
+    Attributes
+    ----------
+    physical_range, start_range : StateRange or None
+        ``physical``, and where a set starts again: ``largest`` within ``physical``.
 
     Raises
     ------
@@ -83,16 +96,24 @@ class UncertainModel:
     names: Mapping[str, Sequence[str]] | None = None
     uncertainties: Sequence[Uncertainty] = ()
     schedule: Any = None
+    physical: Any = None
+    largest: Any = None
     origin: Origin | None = field(default=None, repr=False)
     layout: Layout = field(init=False, repr=False)
     _stack: Stack = field(init=False, repr=False)
     _bounds: Bounds = field(init=False, repr=False)
+    physical_range: StateRange | None = field(init=False, repr=False)
+    start_range: StateRange | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainties", tuple(self.uncertainties))
         if not (np.isfinite(self.Ts) and self.Ts > 0):
             raise ValueError(f"Ts is {self.Ts}; expected a positive sampling time in seconds")
         object.__setattr__(self, "layout", self._measure())
+        n = self.layout.n
+        object.__setattr__(self, "physical_range", state_range("physical", self.physical, n, bounded=False))
+        largest = state_range("largest", self.largest, n, bounded=True)
+        object.__setattr__(self, "start_range", start_range(self.physical_range, largest))
         object.__setattr__(self, "_stack", self._stacked())
         object.__setattr__(self, "_bounds", bounds_of(self.w, self.n, self.layout.nw, self.layout.ny))
         if self._bounds.scheduled and self.schedule is None:

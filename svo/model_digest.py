@@ -1,8 +1,9 @@
 """Which model a saved state or an alarm belongs to, as a SHA-256.
 
 The digest is that of JSON with sorted keys in UTF-8: sizes, sampling time, bounds of Delta, rows of the disturbance
-set where it is a polytope, the observer's options, and the matrices and bounds of some samples; floats as `float.hex`
-writes them. No name of a class, module or file is in it, so the same model has the same digest wherever it is built.
+set where it is a polytope, the promised ranges of the state where there are any, the observer's options, and the
+matrices and bounds of some samples; floats as `float.hex` writes them. No name of a class, module or file is in it, so
+the same model has the same digest wherever it is built.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ def model_digest(model: UncertainModel, options: Options, samples: Iterable[Mode
     samples : iterable of ModelSample
         A constant model is told apart by one sample, a scheduled one by those of a record.
     """
-    content = {
+    content: dict[str, Any] = {
         "sizes": [model.n_states, model.n_inputs, model.n_outputs, model.n_disturbances],
         "Ts": model.Ts,
         "delta": [u.bounds for u in model.uncertainties],
@@ -73,6 +74,9 @@ def model_digest(model: UncertainModel, options: Options, samples: Iterable[Mode
         "options": dict(options),
         "samples": [{"stack": s.stack, "noise": s.noise, "w": s.w} for s in samples],
     }
+    for name, promise in (("physical", model.physical_range), ("largest", model.start_range)):
+        if promise is not None:
+            content[name] = [promise.lower, promise.upper]
     text = json.dumps(_canonical(content), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -16,7 +16,8 @@ from svo.uncertainty import Uncertainty
 
 ARRAYS = ("A", "B", "a", "E", "C", "D", "c", "F")
 BOUNDS = ("n", "w")
-_MODEL = (*ARRAYS, *BOUNDS, "continuous", "remainder", "varying", "file", "uncertainties")
+RANGES = ("physical", "largest")
+_MODEL = (*ARRAYS, *BOUNDS, *RANGES, "continuous", "remainder", "varying", "file", "uncertainties")
 _UNCERTAINTY = (*ARRAYS, "bounds", "name")
 
 
@@ -44,9 +45,10 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
             "is missing; expected the half-widths of the measurement noise, one an output, such as n = [0.01] "
             "(0 says that a sensor is exact)",
         )
+    ranges = {key: _range(table, key) for key in RANGES if key in table}
     with table.errors():
         make = UncertainModel.from_continuous if continuous else UncertainModel
-        model = make(**{"B": None} | arrays, **rest)
+        model = make(**{"B": None} | arrays, **rest, **ranges)
     sizes = {"inputs": model.n_inputs, "outputs": model.n_outputs, "states": model.n_states}
     for group, columns in names.items():
         if len(columns) != sizes[group]:
@@ -94,6 +96,16 @@ def _disturbance_bounds(table: Table) -> Any:
         return table.array("w")
     ends = table.table("w", ("lower", "upper"))
     return ends.array("lower"), ends.array("upper")
+
+
+def _range(table: Table, key: str) -> Any:
+    """Bounds of every state, as { lower, upper } or [lower, upper]; a physical one that is left out is none."""
+    if not isinstance(table.content[key], dict):
+        return tuple(table.array(key))
+    ends = table.table(key, ("lower", "upper"))
+    if key == "largest" or ("lower" in ends and "upper" in ends):
+        return ends.array("lower"), ends.array("upper")
+    return (ends.array("lower"), np.inf) if "lower" in ends else (-np.inf, ends.array("upper"))
 
 
 def _arrays_of_file(table: Table) -> dict[str, Any]:

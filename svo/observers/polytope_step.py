@@ -82,6 +82,8 @@ class PolytopeCertificate:
         For the rows of all of these, in this order.
     data : MeasuredOutput or None
         What the measurement rows come from; None in a stack of equation (3), whose rows are not a measurement's only.
+    largest_at : int or None
+        Sample at which the observer's set started again from the model's largest set, a premise of ``before``.
     """
 
     sample: int
@@ -89,6 +91,7 @@ class PolytopeCertificate:
     measurement: HPolytope
     multipliers: Certificate
     data: MeasuredOutput | None = None
+    largest_at: int | None = None
 
     def verify(self) -> bool:
         """Whether the multipliers prove that sets and measurement exclude each other, and the data give its rows."""

@@ -8,13 +8,14 @@ own matrix but for the rounding of that factorisation (`weak_duality.FACTOR_TOLE
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
+from svo.observers.free_start import Reading, state_bounds
 from svo.observers.weak_duality import DualSum, NoProof, exact
 from svo.observers.window_kernel import BASE, TIME, Sizes
 
@@ -32,6 +33,20 @@ class ArrivalSet:
     rows: Array
     lower: Array
     upper: Array
+
+    @classmethod
+    def box(cls, lower: Array, upper: Array) -> ArrivalSet:
+        """A box without further rows."""
+        return cls(lower, upper, np.zeros((0, lower.size)), np.zeros(0), np.zeros(0))
+
+    @classmethod
+    def unknown(cls, n: int) -> ArrivalSet:
+        """Nothing known of n states: what follows rests on the window's readings alone."""
+        return cls.box(np.full(n, -np.inf), np.full(n, np.inf))
+
+    @property
+    def is_unknown(self) -> bool:
+        return bool(np.isneginf(self.box_lower).all() and np.isposinf(self.box_upper).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +105,8 @@ class WindowCertificate:
     samples : tuple of WindowSample
     late : bool
         Whether w and the channels of the last sample take part (they do where the output depends on them).
+    largest_at : int or None
+        Sample at which the observer's set started again from the model's largest set, a premise of the arrival set.
     """
 
     first: int
@@ -104,9 +121,13 @@ class WindowCertificate:
     arrival: ArrivalSet
     on_arrival: Array
     samples: tuple[WindowSample, ...]
+    largest_at: int | None = None
 
     def verify(self) -> bool:
         """Check the proof in exact rational arithmetic; True only if it proves that the window is empty.
+
+        An arrival set of which nothing is known is bounded first, by the readings of the window
+        (`svo.observers.free_start`).
 
         False, and no error, for arrays of wrong shapes, for NaN or Inf out of place and for intervals whose ends are
         in the wrong order: a stored certificate may hold anything.
@@ -114,7 +135,7 @@ class WindowCertificate:
         if not _is_well_formed(self):
             return False
         try:
-            return DualSum(self).gap() > 0
+            return any(DualSum(stated).gap() > 0 for stated in _with_known_start(self))
         except NoProof:
             return False
 
@@ -130,14 +151,31 @@ class WindowCertificate:
         Returns
         -------
         fmpq or None
-            None where the multipliers prove nothing.
+                None where the multipliers prove nothing.
         """
-        if not _is_well_formed(self):
+        if not _is_well_formed(self) or self.arrival.is_unknown:
             return None
         try:
             return -DualSum(self, (sample - self.first, direction)).gap()
         except NoProof:
             return None
+
+
+def _with_known_start(c: WindowCertificate) -> Iterator[WindowCertificate]:
+    """The certificate; without anything known of its arrival set, with what its first few, or more, readings say."""
+    if not c.arrival.is_unknown:
+        yield c
+        return
+    items = range(1, len(c.samples[0].stack))
+    owned = [c.delta[c.owner == item] for item in items]
+    if any(len(d) == 0 and s.stack[i].any() for i, d in zip(items, owned, strict=True) for s in c.samples):
+        return  # nothing says how far its Delta goes
+    delta = np.array([d[0] if len(d) else (0.0, 0.0) for d in owned]).reshape(-1, 2)
+    readings = [Reading(*(getattr(s, field) for field in Reading._fields)) for s in c.samples]
+    for count in range(1, len(readings) + 1):
+        found = state_bounds(readings[:count], delta, 0.0)
+        if found is not None and np.isfinite(found).all():
+            yield replace(c, arrival=ArrivalSet.box(*found))
 
 
 def _is_well_formed(c: WindowCertificate) -> bool:
@@ -157,6 +195,8 @@ def _is_well_formed(c: WindowCertificate) -> bool:
         *((-s.slack, s.slack) for s in c.samples),
     ]
     if not all(np.all(lower <= upper) for lower, upper in intervals) or any(np.isinf(s.y).any() for s in c.samples):
+        return False
+    if c.arrival.is_unknown and len(c.on_arrival):
         return False
     return bool(np.all((c.owner > 0) & (c.owner < len(c.samples[0].stack))))
 
@@ -180,7 +220,8 @@ def _expected_arrays(c: WindowCertificate) -> Iterator[tuple[Any, tuple[int, ...
     yield c.delta, (nq, 2), real, True
     yield c.w_rows, (nh, nw), real, True
     yield from ((v, (nh,), real, False) for v in (c.w_rows_lower, c.w_rows_upper))
-    yield from ((v, (n,), real, True) for v in (c.arrival.box_lower, c.arrival.box_upper))
+    known = not c.arrival.is_unknown
+    yield from ((v, (n,), real, known) for v in (c.arrival.box_lower, c.arrival.box_upper))
     yield c.arrival.rows, (na, n), real, True
     yield from ((v, (na,), real, False) for v in (c.arrival.lower, c.arrival.upper))
     yield c.on_arrival, (na,), real, True

@@ -74,7 +74,7 @@ class SplitCertificate:
 
 
 def _same_window(a: WindowCertificate, b: WindowCertificate) -> bool:
-    own = ("first", "last", "n", "late", "delta", "owner", "w_rows", "w_rows_lower", "w_rows_upper")
+    own = ("first", "last", "n", "late", "largest_at", "delta", "owner", "w_rows", "w_rows_lower", "w_rows_upper")
     data = ("stack", "u", "y", "noise", "slack", "w_lower", "w_upper")
     pairs = [(getattr(a, name), getattr(b, name)) for name in own]
     pairs += [(getattr(a.arrival, name), getattr(b.arrival, name)) for name in ArrivalSet.__dataclass_fields__]

@@ -21,11 +21,14 @@ class Step(Protocol):
     ----------
     verdict : {"consistent", "falsified", "undecided"}
         "falsified" only with a certificate that has been checked in exact arithmetic.
+    reason : str or None
+        Why a verdict is "undecided", where it is known: "outgrown" (the set has grown beyond all bounds of use in a gap
+        of the measurements, and what came back does not yet bound the state), "outside the physical range".
     certificate : object with ``verify()``, or None
     seconds : float
         Wall time of the call.
     box : (lower, upper)
-        Bounds of the current state; NaN once the model is falsified.
+        Bounds of the current state; infinite while the set is outgrown, NaN once the model is falsified.
     set : HPolytope
         The template set of the current state; empty once the model is falsified.
     support(directions) : (k,) array
@@ -40,6 +43,9 @@ class Step(Protocol):
 
     @property
     def seconds(self) -> float: ...
+
+    @property
+    def reason(self) -> str | None: ...
 
     @property
     def box(self) -> tuple[Array, Array]: ...

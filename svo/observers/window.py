@@ -16,18 +16,21 @@ from svo.model import UncertainModel
 from svo.observers import window_kernel as kernel
 from svo.observers.data import check_schedule, inputs_shaped, outputs_shaped, steps_of
 from svo.observers.proof import ArrivalSet
-from svo.observers.window_programs import ENTRY_ERRORS, WindowPrograms
+from svo.observers.step import VerdictName
+from svo.observers.window_programs import ENTRY_ERRORS
+from svo.observers.window_restart import RestartingWindow
 from svo.observers.window_setup import (
     finite_box,
     joint_rows,
     template_rows,
+    within,
 )
 from svo.observers.window_step import WindowRecord, WindowStep
 
 Array = NDArray[np.float64]
 
 
-class WindowObserver(WindowPrograms):
+class WindowObserver(RestartingWindow):
     """Set-valued observer over a moving window of N steps (the lifted form of paper 002, section 2).
 
     The window holds the state at its first sample, every disturbance and every channel of uncertainty since;
@@ -92,10 +95,10 @@ class WindowObserver(WindowPrograms):
         Raises
         ------
         ValueError
-            If the set is empty, unbounded or of the wrong dimension.
+            If the set is empty, unbounded or of the wrong dimension, or outside the model's physical range.
         """
         lower, upper = finite_box(set, self.model.n_states)
-        self._begin(ArrivalSet(lower, upper, *joint_rows(set)), self._first_steps)
+        self._begin_first(ArrivalSet(*within(self.model.physical_range, lower, upper), *joint_rows(set)))
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> WindowStep:
         """The first measurement, without a transition.
@@ -151,14 +154,14 @@ class WindowObserver(WindowPrograms):
         """
         begun = perf_counter()
         if self._falsified is not None:
-            return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
+            return self._step("falsified", begun)
         outputs = outputs_shaped(self.model, y)
         inputs = inputs_shaped(self.model, "u", u, True)
         following = inputs_shaped(self.model, "u_next", u_next, self._wants_next_input)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
         if not self._started:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
-        if self.horizon is None and self._time + 1 >= self._size.N:
+        if self.horizon is None and not self._lost and self._time + 1 >= self._size.N:
             self._grow()
         end = None if deadline is None else begun + deadline
         return self._sample(False, inputs, following, outputs, stack, noise, (w_lower, w_upper), begun, end)
@@ -185,14 +188,8 @@ class WindowObserver(WindowPrograms):
         begun = perf_counter()
         self.check_late(y, sample)
         if self._falsified is not None:
-            return WindowStep(self, self._time, "falsified", self._falsified, perf_counter() - begun)
-        outputs = outputs_shaped(self.model, y)
-        kernel.add_late(self._window, self._size, sample, outputs, self.eps)
-        if self._injection is not None:  # the sample was incomplete, so it is as it was given
-            s = sample % (self._size.N + 1)
-            self._arrays["given.y"][s], self._arrays["given.slack"][s] = self._arrays["y"][s], self._arrays["slack"][s]
-        verdict = self._solve(kernel.ARRIVAL)
-        return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+            return self._step("falsified", begun)
+        return self._step(self._take_late(outputs_shaped(self.model, y), sample), begun)
 
     def check_late(self, y: ArrayLike, sample: int) -> None:
         """Raise what `late_update` would raise; nothing changes."""
@@ -204,7 +201,7 @@ class WindowObserver(WindowPrograms):
             raise ValueError(f"sample is {sample!r}; expected one in the window, which holds {first} to {last}")
         if np.isinf(outputs).any():
             raise ValueError(ENTRY_ERRORS[kernel.BAD_OUTPUT].format(y=y))
-        read = ~np.isnan(outputs) & ~np.isnan(self._arrays["y"][sample % (self._size.N + 1)])
+        read = ~np.isnan(outputs) & ~np.isnan(self._read_at(sample))
         if read.any():
             raise ValueError(f"y has a value of sensor {int(np.argmax(read))}, which was already read at {sample}")
 
@@ -219,7 +216,7 @@ class WindowObserver(WindowPrograms):
         """
         if not self._started:
             raise ValueError("there is no sample yet; call update(y0), with NaN if there is no measurement")
-        return int(self._arrays["clock"][kernel.BASE]), self._time
+        return self._oldest, self._number
 
     @property
     def options(self) -> dict[str, Any]:
@@ -234,7 +231,7 @@ class WindowObserver(WindowPrograms):
         last = dict(zip(("w_old_lower", "w_old_upper"), self._last_bounds or (), strict=False))
         falsified = np.array(float(self._falsified is not None))
         state = {"settings": settings, "falsified": falsified, "template": self._template, **first, **last}
-        state |= self._arrays
+        state |= self._arrays | self._restart_state()
         return {name: value.copy() for name, value in state.items()}
 
     @classmethod
@@ -251,7 +248,8 @@ class WindowObserver(WindowPrograms):
             initial = ArrivalSet(**{f.name: np.array(state[f"initial.{f.name}"]) for f in fields(ArrivalSet)})
             observer = cls.__new__(cls)
             observer._configure(model, None if horizon < 0 else int(horizon), state["template"], eps, int(cells))
-            observer._begin(initial, int(steps))
+            observer._begin_first(initial)
+            observer._restore_restart(state, int(steps))
             for name, array in observer._arrays.items():
                 array[...] = state[name]
         except (KeyError, TypeError, ValueError) as error:
@@ -322,18 +320,18 @@ class WindowObserver(WindowPrograms):
     ) -> WindowStep:
         w_old = self._last_bounds or w
         data = (self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
-        if end is None:
-            verdict = self._take(data)
-        else:
-            self._enter(data, end)
-            verdict = self._solve_until(end)
+        verdict = self._answer(data, end)
         self._last_bounds = w
-        return WindowStep(self, self._time, verdict, self._falsified, perf_counter() - begun)
+        return self._step(verdict, begun)
+
+    def _step(self, verdict: VerdictName, begun: float) -> WindowStep:
+        reason = self._reason if verdict == "undecided" else None
+        return WindowStep(self, self._number, verdict, self._falsified, perf_counter() - begun, reason)
 
     def _check_current(self, sample: int) -> None:
-        if sample != self._time:
+        if sample != self._number:
             raise ValueError(
-                f"the set of sample {sample} was not read before sample {self._time}; "
+                f"the set of sample {sample} was not read before sample {self._number}; "
                 "read it right after its step, or use run(log)"
             )
 
@@ -343,16 +341,16 @@ class WindowObserver(WindowPrograms):
         if self._falsified is not None:
             nothing = np.full(self._size.nt, np.nan)
             return nothing, nothing.copy()
-        self._solve(kernel.NEWEST)
-        return self._arrays["now_lower"].copy(), self._arrays["now_upper"].copy()
+        return self._newest_bounds()
 
     def _support_at(self, sample: int, directions: Array) -> Array:
         self._check_current(sample)
         if self._falsified is not None:
             return np.full(len(directions), -np.inf)
-        values = np.empty(len(directions))
-        for i, direction in enumerate(directions):
+        values = np.full(len(directions), np.inf)
+        for i, direction in enumerate(directions if not self._lost else ()):
             self._arrays["query"][:] = direction
             self._solve(kernel.QUERY)
             values[i] = self._arrays["answer"][0]
-        return values
+        physical = self.model.physical_range
+        return values if physical is None else np.minimum(values, physical.support(directions))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,7 +36,11 @@ class WindowMemory:
     eps : float
     sign_split : int
         As in `svo.WindowObserver`.
+    largest_at : int or None
+        Sample at which the set last started from the model's largest set, if what is known now rests on it.
     """
+
+    largest_at: int | None
 
     def _configure(
         self, model: UncertainModel, horizon: int | None, template: Array, eps: float, sign_split: int
@@ -56,13 +62,16 @@ class WindowMemory:
         """Steps that an empty window has room for."""
         return _GROWING_START if self.horizon is None else self.horizon + self._block - 1
 
-    def _begin(self, initial: ArrivalSet, steps: int) -> None:
-        """An empty window of so many steps at most, anchored at the first states."""
-        self._initial = initial
+    def _begin(self, anchor: ArrivalSet, steps: int, origin: int = 0, free: bool = False) -> None:
+        """An empty window of so many steps at most, anchored at a set of first states.
+
+        Its first sample is the observer's ``origin``; ``free`` says that the set follows from the window's readings.
+        """
+        self._anchor, self._origin, self._free = anchor, origin, free
         self._allocate(steps)
         n, w = self.model.n_states, self._arrays
-        w["h_lower"][:n], w["h_upper"][:n] = initial.box_lower, initial.box_upper
-        kernel.initialise(self._window, self._size, initial.rows, initial.lower, initial.upper)
+        w["h_lower"][:n], w["h_upper"][:n] = anchor.box_lower, anchor.box_upper
+        kernel.initialise(self._window, self._size, anchor.rows, anchor.lower, anchor.upper)
         self._falsified: WindowCertificate | SplitCertificate | None = None
         self._last_bounds: tuple[Array, Array] | None = None
 
@@ -72,7 +81,7 @@ class WindowMemory:
         nw = model.n_disturbances + (0 if self._injection is None else n)
         w_rows = joint_rows(polytope) if polytope is not None else (np.zeros((0, nw)), np.zeros(0), np.zeros(0))
         nv, nr = nw + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
-        na = max(len(self._template), len(self._initial.rows))
+        na = max(len(self._template), len(self._anchor.rows))
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
         largest = _LARGEST_BASIS if self.horizon is not None else _LARGEST_GROWING_BASIS
         self._size = kernel.Sizes(
@@ -100,6 +109,7 @@ class WindowMemory:
 
     @property
     def _time(self) -> int:
+        """Newest sample, as the kernel counts from the start of its window."""
         return int(self._arrays["clock"][kernel.TIME])
 
     @property
@@ -108,12 +118,17 @@ class WindowMemory:
 
     def _arrival(self) -> ArrivalSet:
         if self._arrays["clock"][kernel.BASE] == 0:
-            return self._initial
+            return self._anchor
         n, lower, upper = self.model.n_states, self._arrays["h_lower"].copy(), self._arrays["h_upper"].copy()
         return ArrivalSet(lower[:n], upper[:n], self._template, lower[n:], upper[n:])
 
     def _certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
-        """Of the multipliers at hand, about the model and the data as given."""
+        """Of the multipliers at hand, about the model and the data as given.
+
+        ``objective`` is a sample of the window, as the kernel counts, and a direction whose bound is to be proven.
+        """
         if self._injection is not None:
-            return self._injection.certificate(self._arrays, self._size, self._arrival(), objective)
-        return certificate_of(self._arrays, self._size, self._arrival())
+            found = self._injection.certificate(self._arrays, self._size, self._arrival(), objective)
+        else:
+            found = certificate_of(self._arrays, self._size, self._arrival())
+        return replace(found, first=found.first + self._origin, last=found.last + self._origin)

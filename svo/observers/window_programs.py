@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 
 from svo.observers import window_kernel as kernel
 from svo.observers.fallback import candidates, is_feasible
+from svo.observers.proof import ArrivalSet, WindowCertificate
 from svo.observers.sign_split import SplitPrograms
 from svo.observers.step import VerdictName
 from svo.observers.window_memory import WindowMemory
@@ -24,6 +27,22 @@ ENTRY_ERRORS = {
 }
 
 
+class Outgrown(Exception):
+    """The newest state has no bounds of use: the window is of no more use either."""
+
+
+def check_numbers(data: tuple[Any, ...]) -> None:
+    """What the kernel checks of the data of a sample."""
+    u, u_next, y, stack = data[3:7]
+    for code, holds in (
+        (kernel.BAD_INPUT, np.isfinite(u).all() and np.isfinite(u_next).all()),
+        (kernel.BAD_OUTPUT, not np.isinf(y).any()),
+        (kernel.BAD_MATRIX, np.isfinite(stack).all()),
+    ):
+        if not holds:
+            raise ValueError(ENTRY_ERRORS[code].format(u=u, y=y))
+
+
 class WindowPrograms(WindowMemory):
     """Verdicts about a window. "Falsified" is kept, with the proof that was checked."""
 
@@ -34,6 +53,8 @@ class WindowPrograms(WindowMemory):
             return self._solve(kernel.ARRIVAL)
         code, verdict, program = kernel.take(*data, self.eps, kernel.PIVOT_LIMIT)
         self._check_entry(code, data)
+        if code == kernel.OUTGROWN:
+            raise Outgrown
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._conclude(kernel.ARRIVAL, verdict, program)
@@ -58,7 +79,8 @@ class WindowPrograms(WindowMemory):
                     self._solve_in_portions(kernel.CHANNELS, program, end)
         if injected:
             self._widen(given)
-        kernel.complete(*data[:3], self.eps)
+        if not kernel.complete(*data[:3], self.eps):
+            raise Outgrown
         if self._injection is not None and not injected:
             w["given.slack"][s] = w["slack"][s]
 
@@ -161,17 +183,25 @@ class WindowPrograms(WindowMemory):
 
     def _prove(self) -> bool:
         """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
-        certificate = self._certificate()
-        if certificate.verify():
-            self._falsified = certificate
-        return self._falsified is not None
+        for certificate in self._statements():
+            if certificate.verify():
+                self._falsified = certificate
+                return True
+        return False
+
+    def _statements(self) -> Iterator[WindowCertificate]:
+        """What the multipliers may prove: of a window that its readings alone began, first without any arrival set."""
+        certificate = replace(self._certificate(), largest_at=self.largest_at)
+        if self._free and self._arrays["clock"][kernel.BASE] == 0:
+            yield replace(certificate, arrival=ArrivalSet.unknown(self.model.n_states), on_arrival=np.zeros(0))
+        yield certificate
 
     def _prove_again(self) -> None:
         """The proof of a falsification, from the window alone."""
         if self.sign_split:
             self._solve(kernel.ARRIVAL)
         if self._falsified is None:
-            self._falsified = self._certificate()
+            self._falsified = next(self._statements())
 
     def _ask_highs(self) -> VerdictName:
         w = self._arrays

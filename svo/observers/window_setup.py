@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from svo.model import UncertainModel
+from svo.state_range import StateRange
 
 Array = NDArray[np.float64]
 
@@ -74,6 +75,16 @@ def check_first_states(P: HPolytope, n: int) -> None:
         raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
     if P.emptiness().status != "nonempty":
         raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
+
+
+def within(physical: StateRange | None, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Bounds of a set of first states, cut to the physical range."""
+    if physical is None:
+        return lower, upper
+    lower, upper, meets = physical.cut(lower, upper)
+    if not meets:
+        raise ValueError("initial and the model's physical range have no common point; expected first states within it")
+    return lower, upper
 
 
 def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:

@@ -42,6 +42,7 @@ class WindowStep:
     verdict: VerdictName
     certificate: WindowCertificate | SplitCertificate | None
     seconds: float
+    reason: str | None = None
 
     @property
     def box(self) -> tuple[Array, Array]:
@@ -57,7 +58,9 @@ class WindowStep:
         rows = self.observer.directions
         if np.isnan(lower).any():
             return HPolytope.empty(rows.shape[1])
-        return HPolytope(np.vstack([rows, -rows]), np.concatenate([upper, -lower]))
+        bounds = np.concatenate([upper, -lower])
+        known = np.isfinite(bounds)
+        return HPolytope(np.vstack([rows, -rows])[known], bounds[known])
 
     def support(self, directions: ArrayLike) -> Array:
         """Outer bounds of d'x over the states that the window allows, in any directions.

@@ -6,14 +6,14 @@ import numpy as np
 from numba import njit
 
 from svo.observers.window_kernel.channels import bound_channels, factor_all, open_channel
-from svo.observers.window_kernel.memory import PENDING, STARTED, TIME, UNDECIDED
+from svo.observers.window_kernel.memory import LARGEST, PENDING, STARTED, TIME, UNDECIDED
 from svo.observers.window_kernel.motion import advance, anchor, slide
 from svo.observers.window_kernel.programs import ALL, ARRIVAL, CHANNELS, solve_programs
 from svo.observers.window_kernel.rows import clear_row, measure, midpoint, scale_arrival_row, set_row
 from svo.observers.window_kernel.short_rows import copy, fill
 from svo.observers.window_kernel.sources import SOURCES
 
-FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE = range(6)
+FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE, OUTGROWN = range(7)
 
 
 @njit(error_model="numpy")
@@ -107,7 +107,21 @@ def _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper,
 
 
 @njit(error_model="numpy")
+def _is_bounded(w, size, k):
+    """Whether the newest state and the slack of its readings have bounds of use; NaN and infinity are none."""
+    s = k % (size.N + 1)
+    for j in range(size.n):
+        if not w.mag[s, j] < LARGEST:
+            return False
+    slack = 0.0
+    for o in range(size.ny):
+        slack += w.slack[s, o]
+    return np.isfinite(slack)
+
+
+@njit(error_model="numpy")
 def _complete(w, size, first, eps):
+    """False if the window has outgrown all bounds, and is of no more use."""
     k = w.clock[TIME]
     if size.late == 1:
         _open_slot(w, size, k)
@@ -118,6 +132,7 @@ def _complete(w, size, first, eps):
         w.clock[TIME] = k
     measure(w, size, k, eps)
     w.clock[STARTED] = 1
+    return _is_bounded(w, size, k)
 
 
 def _compile_enter(sources):
@@ -140,9 +155,9 @@ enter = _compile_enter(SOURCES)
 def _compile_complete(sources):
     @njit(cache=True, error_model="numpy")
     def complete(w, size, first, eps):
-        """Write the rows of the sample that `enter` took."""
+        """Write the rows of the sample that `enter` took; False if the window has outgrown all bounds."""
         sources  # noqa: B018 - in the closure, so part of the cache's key
-        _complete(w, size, first, eps)
+        return _complete(w, size, first, eps)
 
     return complete
 
@@ -155,7 +170,7 @@ def _compile_take(sources):
     def take(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper, eps, limit):
         """A whole sample in one call: `enter`, CHANNELS where a sign is open, `complete`, and the ARRIVAL programs.
 
-        Returns (what `enter` returns, verdict, program that found the window empty or -1).
+        Returns (what `enter` returns or OUTGROWN, verdict, program that found the window empty or -1).
         """
         sources  # noqa: B018 - in the closure, so part of the cache's key
         code = _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper)
@@ -166,7 +181,8 @@ def _compile_take(sources):
                 start = program + 1 if program >= 0 else -1
         elif code != FINE:
             return code, UNDECIDED, -1
-        _complete(w, size, first, eps)
+        if not _complete(w, size, first, eps):
+            return OUTGROWN, UNDECIDED, -1
         verdict, program = solve_programs(w, size, ARRIVAL, 0, ALL, limit)
         return code, verdict, program
 

@@ -1,0 +1,90 @@
+"""The last samples of an observer that has no set of states, or one too wide to be of use, until they bound the state.
+
+Kept apart from the observers: each of them starts again from the box that `Readings.start` gives, with the samples
+that gave it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from itertools import dropwhile
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.model import UncertainModel
+from svo.observers.free_start import Reading, state_bounds
+from svo.observers.window_kernel import LARGEST
+
+Array = NDArray[np.float64]
+
+OUTGROWN = "outgrown"
+_ROOM = 1.01  # times the half-width of a start: the set is the start of a window, whose readings shrink it at once
+_EXTRA = 10  # samples more than states, of which the readings are tried
+
+
+class Readings:
+    """Samples whose readings are to bound the state without any set before.
+
+    Parameters
+    ----------
+    model : UncertainModel
+    eps : float
+        As the observer's.
+    horizon : int
+        Steps that the observer looks back, at least so many samples are kept.
+    """
+
+    def __init__(self, model: UncertainModel, eps: float, horizon: int = 0) -> None:
+        self._n, self._eps = model.n_states, eps
+        self._delta = np.array([u.bounds for u in model.uncertainties]).reshape(-1, 2)
+        self.samples: deque[Reading] = deque(maxlen=max(horizon, model.n_states + _EXTRA) + 1)
+
+    @property
+    def is_full(self) -> bool:
+        return len(self.samples) == self.samples.maxlen
+
+    def add(self, u: Array, reading: Reading) -> None:
+        """The next sample; u drives the transition to it."""
+        if self.samples:
+            self.samples[-1] = self.samples[-1]._replace(u=u.copy())
+        self.samples.append(usable(reading))
+
+    def add_late(self, y: Array, age: int) -> None:
+        """Values of a sample that came ``age`` samples ago, if it is still kept; NaN = not these."""
+        if age < len(self.samples):
+            old = self.samples[-1 - age]
+            self.samples[-1 - age] = usable(old._replace(y=np.where(np.isnan(y), old.y, y)))
+
+    def start(self) -> tuple[list[Reading], Array, Array] | None:
+        """The samples from the first reading on and bounds of the state there, once they are finite."""
+        if not self.samples or np.isnan(self.samples[-1].y).all():
+            return None
+        used = list(dropwhile(lambda sample: np.isnan(sample.y).all(), self.samples))
+        if sum(int((~np.isnan(s.y)).sum()) for s in used) < self._n:
+            return None
+        found = state_bounds(used, self._delta, self._eps)
+        if found is None:
+            return None
+        lower, upper = found
+        middle = 0.5 * lower + 0.5 * upper
+        half = _ROOM * np.maximum(upper - middle, middle - lower)
+        if not (np.abs(middle) + half < LARGEST).all():
+            return None
+        return used, middle - half, middle + half
+
+    def state(self) -> dict[str, Array]:
+        """The samples as named arrays."""
+        return {f: np.array([getattr(s, f) for s in self.samples]) for f in Reading._fields} if self.samples else {}
+
+    def restore(self, state: Mapping[str, Array]) -> None:
+        """Take back what `state` gave."""
+        columns: list[Any] = [state.get(f, ()) for f in Reading._fields]
+        self.samples.extend(Reading(*(np.array(v) for v in values)) for values in zip(*columns, strict=True))
+
+
+def usable(reading: Reading) -> Reading:
+    """Without the values that are beyond any state that an observer bounds."""
+    return reading._replace(y=np.where(np.abs(reading.y) < LARGEST, reading.y, np.nan))
