@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+_EPS = float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +43,9 @@ class StateRange:
         ends = np.where(directions > 0.0, self.upper, self.lower)
         products = np.where(directions == 0.0, 0.0, directions) * np.where(directions == 0.0, 0.0, ends)
         total = products.sum(axis=1)
-        rounding = 4.0 * (directions.shape[1] + 1) * np.finfo(float).eps * np.abs(products).sum(axis=1)
-        return np.where(np.isfinite(total), total + np.where(np.isfinite(rounding), rounding, 0.0), np.inf)
+        is_axis = (np.count_nonzero(directions, axis=1) == 1) & (np.abs(directions).sum(axis=1) == 1.0)
+        terms = np.where(np.isfinite(total) & ~is_axis, np.abs(products).sum(axis=1), 0.0)
+        return np.where(np.isfinite(total), total, np.inf) + 4.0 * (directions.shape[1] + 1) * _EPS * terms
 
 
 def state_range(name: str, value: Any, n: int, bounded: bool) -> StateRange | None:

@@ -114,10 +114,14 @@ def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
     bounds = sum(observer.checked for observer in proving.values())
     if unproven:
         return False, f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}"
+    own = proving[alarm.observer]
+    again, promises = own.start_at(started), "".join(f" and {promise}" for promise in own.promises)
+    if again is not None:
+        return True, f"proven over {bounds} bounds, given {again}{promises}"
     if started == 0:
-        return True, f"proven from the first sample, over {bounds} bounds"
+        return True, f"proven from the first sample, over {bounds} bounds" + promises.replace(" and", ", given", 1)
     given = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
-    return True, f"proven from its start at sample {started} over {bounds} bounds, given {given}"
+    return True, f"proven from its start at sample {started} over {bounds} bounds, given {given}{promises}"
 
 
 def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None]:

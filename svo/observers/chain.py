@@ -3,7 +3,7 @@
 What a window proves is conditional on its arrival set and on the bounds of its channels' s. Run again over the log
 with `ProvingObserver`, each of those bounds is checked when it is made: the multipliers of its program prove, by weak
 duality in rational arithmetic, a bound that is no larger. By induction the alarm then follows from the initial set, the
-model and the log alone.
+model and the log alone; where the set started again, from the largest set there, or from the readings since.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from svo.log import Log
 from svo.observers import window_kernel as kernel
-from svo.observers.proof import WindowCertificate, exact
+from svo.observers.proof import ArrivalSet, WindowCertificate, exact
 from svo.observers.sign_split import SplitCertificate
 from svo.observers.step import VerdictName
 from svo.observers.window import WindowObserver
@@ -45,6 +45,8 @@ class ChainCheck:
         Of the falsification.
     seconds : float
         Time that it took.
+    given : tuple of str
+        What the proof rests on besides the model, its bounds and the log: where it starts, and the physical range.
     """
 
     proven: bool
@@ -53,6 +55,7 @@ class ChainCheck:
     unproven: tuple[str, ...]
     certificate: WindowCertificate | None
     seconds: float
+    given: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +126,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
         unproven=tuple(again.unproven),
         certificate=certificate,
         seconds=perf_counter() - begun,
+        given=(again.start_at(0) or "the first set", *again.promises),
     )
 
 
@@ -146,14 +150,32 @@ class ProvingObserver(WindowObserver):
         again = cls.__new__(cls)
         again._configure(observer.model, observer.horizon, observer._template, observer.eps, 0)
         again.checked, again.unproven = 0, []
-        again._begin(observer._initial, observer._first_steps)
+        again._begin_first(observer._initial)
         return again
+
+    def start_at(self, shift: int) -> str | None:
+        """Where a set that started again did, its samples counted from ``shift``; None for the set it was given."""
+        if self.largest_at is not None:
+            return f"the largest set at sample {shift + self.largest_at}, where the set started again"
+        if self._free:
+            return f"nothing before sample {shift + self._origin}, from which on the readings alone bound the state"
+        return None
+
+    @property
+    def promises(self) -> tuple[str, ...]:
+        """What is promised of the plant at all times, besides its model."""
+        return () if self.model.physical_range is None else ("the physical range",)
 
     @property
     def certificate(self) -> WindowCertificate | None:
         """Of the falsification, once there is one."""
         assert not isinstance(self._falsified, SplitCertificate)  # it keeps the hulls
         return self._falsified
+
+    def _start(self, arrival: ArrivalSet, number: int, free: bool = False) -> None:
+        super()._start(arrival, number, free)
+        # Nothing before is used any more. Bounds by readings alone have been proven where they were found.
+        self.checked, self.unproven = int(free), []
 
     def _take(self, data: tuple[Any, ...]) -> VerdictName:
         self._enter(data)
@@ -192,8 +214,9 @@ class ProvingObserver(WindowObserver):
         i, lower = program // 2, program % 2 == 1
         bound = exact(-self._arrays["new_lower"][i] if lower else self._arrays["new_upper"][i])
         direction = -self._arrays["T"][i] if lower else self._arrays["T"][i]
-        proven = self._with_multipliers(program, target, direction).proven_bound(target, direction)
-        self._count(proven is not None and proven <= bound, f"arrival bound {program} of sample {target}")
+        proven = self._bound_by_multipliers(program, target, direction)
+        what = f"arrival bound {program} of sample {target + self._origin}"
+        self._count(proven is not None and proven <= bound, what)
 
     def _check_channel(self, v: int, q: int, side: int, basis: int | None) -> None:
         """s = f'(x, u, 1, w) <= s_upper, or -s <= -s_lower, by the program's multipliers or by none at all."""
@@ -204,9 +227,10 @@ class ProvingObserver(WindowObserver):
         bound = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q])
         known = self._known_part(f, time, v)
         bases = [None] if basis is None else [basis, None]
-        proofs = [self._with_multipliers(b, time, f[: size.n]).proven_bound(time, f[: size.n]) for b in bases]
+        proofs = [self._bound_by_multipliers(b, time, f[: size.n]) for b in bases]
         holds = any(proof is not None and proof + known <= bound for proof in proofs)
-        self._count(holds, f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time}")
+        what = f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time + self._origin}"
+        self._count(holds, what)
 
     def _known_part(self, f: Array, time: int, v: int) -> fmpq:
         """Largest value of what u, the constant and w contribute to f'(x, u, 1, w)."""
@@ -218,17 +242,17 @@ class ProvingObserver(WindowObserver):
             total += exact(value) * exact(high if value > 0 else low)
         return total
 
-    def _with_multipliers(self, basis: int | None, sample: int, direction: Array) -> WindowCertificate:
-        """The window with the multipliers of the program solved last, whose basis is given; None: without any.
+    def _bound_by_multipliers(self, basis: int | None, sample: int, direction: Array) -> fmpq | None:
+        """What the multipliers of the program solved last, whose basis is given, prove of a direction at a sample.
 
-        They are to prove a bound of the direction at the sample.
+        None: without any multipliers. The sample is one of the window, as the kernel counts.
         """
         w = self._arrays
         w["farkas"][:] = 0.0
         if basis is not None:
             k = int(w["k"][basis])
             w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
-        return self._certificate((sample, direction))
+        return self._certificate((sample, direction)).proven_bound(sample + self._origin, direction)
 
     def _count(self, holds: bool, what: str) -> None:
         self.checked += 1

@@ -58,7 +58,8 @@ def state_bounds(samples: Sequence[Reading], delta: Array, eps: float) -> tuple[
     Returns
     -------
     (lower, upper) or None
-        None where the readings do not bound the state, or not as far as one inverse of O shows.
+        None where the readings do not bound the state, or not as far as one inverse of O shows; infinite where floats
+        end.
     """
     inverse = _left_inverse(samples, delta)
     if inverse is None:
@@ -188,7 +189,7 @@ def _contraction(centre: Any, alpha: Any, M: Any) -> tuple[Array, Array] | None:
     share, constant = _up(M), _up(known)
     n = len(constant)
     if not (np.isfinite(share).all() and np.isfinite(constant).all()):
-        return None
+        return np.full(n, -np.inf), np.full(n, np.inf)
     floor = max(float(constant.max()), np.finfo(float).tiny) * 1e-12
     try:
         z = np.asarray(np.linalg.solve(np.eye(n) - share, constant * (1.0 + 1e-9) + floor), dtype=np.float64)

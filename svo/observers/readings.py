@@ -59,21 +59,22 @@ class Readings:
             self.samples[-1 - age] = usable(old._replace(y=np.where(np.isnan(y), old.y, y)))
 
     def start(self) -> tuple[list[Reading], Array, Array] | None:
-        """The samples from the first reading on and bounds of the state there, once they are finite."""
+        """The samples from the first reading on and bounds of the state there, once there are any of use."""
         if not self.samples or np.isnan(self.samples[-1].y).all():
             return None
-        used = list(dropwhile(lambda sample: np.isnan(sample.y).all(), self.samples))
-        if sum(int((~np.isnan(s.y)).sum()) for s in used) < self._n:
-            return None
-        found = state_bounds(used, self._delta, self._eps)
-        if found is None:
-            return None
-        lower, upper = found
-        middle = 0.5 * lower + 0.5 * upper
-        half = _ROOM * np.maximum(upper - middle, middle - lower)
-        if not (np.abs(middle) + half < LARGEST).all():
-            return None
-        return used, middle - half, middle + half
+        used = list(self.samples)
+        while used and sum(int((~np.isnan(s.y)).sum()) for s in used) >= self._n:
+            used = list(dropwhile(lambda sample: np.isnan(sample.y).all(), used))
+            found = state_bounds(used, self._delta, self._eps)
+            if found is None:
+                return None
+            lower, upper = found
+            if np.maximum(np.abs(lower), np.abs(upper)).max() < LARGEST:
+                middle = 0.5 * lower + 0.5 * upper
+                half = _ROOM * np.maximum(upper - middle, middle - lower)
+                return used, middle - half, middle + half
+            used = used[1:]  # its input or reading is beyond all bounds
+        return None
 
     def state(self) -> dict[str, Array]:
         """The samples as named arrays."""

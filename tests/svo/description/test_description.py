@@ -243,3 +243,29 @@ def test_bank_options_are_checked(tmp_path: Path, bank: str, expected: Any) -> N
     with pytest.raises(ValueError, match=r"cart\.toml") as caught:
         read_description(written(tmp_path, more=f"[bank]\n{bank}\n"))
     assert expected in str(caught.value)
+
+
+def test_promised_ranges_of_the_state_are_keys_of_the_model(tmp_path: Path) -> None:
+    ranges = "[model]\nphysical = { lower = [-100.0, -inf] }\nlargest = { lower = [-5.0, -1.0], upper = [5.0, 1.0] }"
+    model = read_description(written(tmp_path, ("[model]", ranges))).model
+    assert model.physical_range is not None
+    assert model.start_range is not None
+    assert [model.physical_range.lower.tolist(), model.physical_range.upper.tolist()] == [[-100, -np.inf], [np.inf] * 2]
+    assert [model.start_range.lower.tolist(), model.start_range.upper.tolist()] == [[-5.0, -1.0], [5.0, 1.0]]
+    as_lists = "[model]\nphysical = [[-100.0, -2.0], [100.0, 2.0]]"
+    assert read_description(written(tmp_path, ("[model]", as_lists))).model.start_range is not None
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("physical = { lower = [1.0, 0.0], upper = [0.0, 0.0] }", r"\[model\]: physical is between"),
+        ("physical = { low = [1.0, 0.0] }", "did you mean 'lower'"),
+        ("largest = { lower = [0.0, 0.0] }", r"\[model.largest\], key 'upper': is missing"),
+        ("largest = { lower = [0.0, -inf], upper = [0.0, 0.0] }", "all finite"),
+        ("largest = 3.0", "key 'largest'"),
+    ],
+)
+def test_a_promised_range_that_is_none_is_named(tmp_path: Path, value: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        read_description(written(tmp_path, ("[model]", f"[model]\n{value}")))
