@@ -46,7 +46,10 @@ class ArrivalSet:
 
     @property
     def is_unknown(self) -> bool:
-        return bool(np.isneginf(self.box_lower).all() and np.isposinf(self.box_upper).all())
+        ends = self.box_lower, self.box_upper
+        if not all(isinstance(end, np.ndarray) and end.dtype == np.float64 for end in ends):
+            return False  # a stored certificate may hold anything
+        return bool((ends[0] == -np.inf).all() and (ends[1] == np.inf).all())
 
 
 @dataclass(frozen=True, eq=False)
