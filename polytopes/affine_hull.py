@@ -1,12 +1,8 @@
 """Implicit equalities: rows that hold with equality at every point, hence the affine hull and its dimension."""
 
-from collections.abc import Sequence
-
 import numpy as np
-from flint import fmpq, fmpq_mat
 
 from polytopes.errors import EmptySetError, UndecidedError
-from polytopes.exact import ZERO
 from polytopes.exact_simplex import affordable, exact_feasibility
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
@@ -65,30 +61,3 @@ def explicit(P: Rows) -> Rows:
 def affine_dim(P: Rows) -> int:
     """Dimension of the affine hull of P; -1 if P is empty."""
     return len(explicit(P).program.flat.free) if known_nonempty(P) else -1
-
-
-def dimension_of_union(sets: Sequence[Rows]) -> int:
-    """Dimension of the affine hull of a union of nonempty sets, exactly."""
-    return _rank(sets, joined=True)
-
-
-def dimension_of_sum(P: Rows, Q: Rows) -> int:
-    """Dimension of the affine hull of the sum of two nonempty sets, exactly."""
-    return _rank([P, Q], joined=False)
-
-
-def _rank(sets: Sequence[Rows], joined: bool) -> int:
-    """Rank of the directions of the affine hulls; `joined` by those from a point of the first to one of each other."""
-    n = sets[0].dim
-    hulls = [explicit(P).program.flat for P in sets]
-    if any(len(flat.free) == n for flat in hulls):
-        return n
-    directions = []
-    points = [flat.lift_exactly([ZERO] * len(flat.free)) for flat in hulls]
-    for flat, point in zip(hulls, points, strict=True):
-        for q in range(len(flat.free)):
-            ahead = flat.lift_exactly([fmpq(int(q == k)) for k in range(len(flat.free))])
-            directions.append([u - v for u, v in zip(ahead, point, strict=True)])
-        if joined:
-            directions.append([u - v for u, v in zip(point, points[0], strict=True)])
-    return int(fmpq_mat(len(directions), n, [v for row in directions for v in row]).rank()) if directions else 0

@@ -7,14 +7,19 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes import combinations, containment, plotting, projection, reduction, sampling
+from polytopes import containment, plotting, projection, reduction, sampling
 from polytopes import support as support_functions
 from polytopes.affine_hull import affine_dim
+from polytopes.affine_image import affine_image
 from polytopes.checks import different_coordinates, real_array, real_number, whole_number
 from polytopes.emptiness import Emptiness
 from polytopes.generators import Generators, generators, rows_of_generators
-from polytopes.hull import rows_of_points
 from polytopes.inner_box import inner_box
+from polytopes.minkowski_sum import minkowski_sum
+from polytopes.outer_template import outer_template
+from polytopes.pontryagin_difference import pontryagin_difference
+from polytopes.preimage import preimage
+from polytopes.product import product
 from polytopes.redundancy import minimal_rows
 from polytopes.rows import Rows, same_space
 from polytopes.support import Ball, SupportResult
@@ -68,15 +73,22 @@ class HPolytope(Rows):
     def from_vertices(cls, V: ArrayLike, rays: ArrayLike | None = None) -> Self:
         """Convex hull of points (k, n), k >= 1, plus the cone of the rays (r, n) if there are any.
 
-        Qhull, in scaled coordinates.  Points and rays within 1e-12 of their spread of a subspace give explicit
-        equalities.
+        In integers where the numbers are short (multiples of one power of two, up to 2^32 times), where there are rays
+        and where the points are flat: the rows are exact where they are floats.  Else by Qhull, in scaled coordinates.
+        Rows that had to be rounded are rounded outward, so that every point satisfies them; points that are flat only
+        to rounding are held in a slab.
+
+        Raises
+        ------
+        UndecidedError
+            If there are rays, and the double description passes 20 000 rows.
         """
         points = real_array("V", V, ("k", "n"))
         if 0 in points.shape:
             raise ValueError(f"V has shape {points.shape}; expected one or more points (none: HPolytope.empty).")
         n = points.shape[1]
         cone = np.empty((0, n)) if rays is None else real_array("rays", rays, ("r", n), meaning="as many columns as V")
-        return cls(*(rows_of_generators(points, cone) if len(cone) else rows_of_points(points)))
+        return cls(*rows_of_generators(points, cone))
 
     @classmethod
     def empty(cls, n: int) -> Self:
@@ -208,8 +220,9 @@ class HPolytope(Rows):
     def vertices(self) -> Floats:
         """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
 
-        Qhull on the dual of the minimal rows, then each vertex from its rows again; corners closer than 1e-9 of the
-        size are one.  The number of vertices, and the cost, grow as m^(n/2).
+        In integers where the rows are short, or the set is flat or thin (and its vertices not too many), each rounded
+        to the nearest floats.  Else Qhull on the dual of the minimal rows, then each vertex from its rows again;
+        corners closer than 1e-9 of the size are one.  The number of vertices, and the cost, grow as m^(n/2).
 
         Raises
         ------
@@ -221,12 +234,14 @@ class HPolytope(Rows):
         return vertices(self)
 
     def generators(self) -> Generators:
-        """Vertices, rays and lines of a nonempty set, bounded or not; see `Generators`.  Costs as `vertices`, in n + 1.
+        """Vertices, rays and lines of a nonempty set, bounded or not; see `Generators`.
 
         Raises
         ------
         EmptySetError
             If the set is empty.
+        UndecidedError
+            If it is unbounded and the double description passes 20 000 rays.
         """
         return generators(self)
 
@@ -266,10 +281,13 @@ class HPolytope(Rows):
 
     def product(self, Q: Rows) -> Self:
         """Cartesian product ``{(x, y) : x in P, y in Q}``."""
-        return type(self)(*combinations.product(self, Q))
+        return type(self)(*product(self, Q))
 
     def preimage(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
-        """``{x : M x + t in P}``: rows multiplied out and rounded, so make implicit equalities explicit first.
+        """``{x : M x + t in P}``: rows multiplied out, outward where they had to be rounded.
+
+        An equality that is rounded becomes two rows.  Of an unbounded preimage that passes 500 rays in integers rows
+        are rounded to nearest.
 
         Parameters
         ----------
@@ -280,7 +298,7 @@ class HPolytope(Rows):
         """
         matrix = real_array("M", M, (self.dim, "k"), meaning="one row per coordinate of the set")
         shift = np.zeros(self.dim) if t is None else real_array("t", t, (self.dim,))
-        return type(self)(self.A @ matrix, self.b - self.A @ shift, self.C @ matrix, self.d - self.C @ shift)
+        return type(self)(*preimage(self, matrix, shift))
 
     def affine_map(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
         """Image ``{M x + t : x in P}``.
@@ -288,8 +306,9 @@ class HPolytope(Rows):
         Parameters
         ----------
         M : array_like (p, n)
-            Any matrix; a singular or flat one gives explicit equalities.  Square maps of condition number below 1e8
-            are inverted, others are projections from n + p coordinates (see `project`).
+            Any matrix; a singular or flat one gives a flat image: with explicit equalities, where they are floats, else
+            in a slab.  The image is exact where the set is computed with in integers (see the page "Polytopes") and
+            the result is floats, and contains the exact one elsewhere.
         t : array_like (p,), optional
             Zero if absent.
         """
@@ -297,21 +316,23 @@ class HPolytope(Rows):
         shift = (
             np.zeros(len(matrix)) if t is None else real_array("t", t, (len(matrix),), meaning="one entry per row of M")
         )
-        return type(self)(*combinations.affine_image(self, matrix, shift))
+        return type(self)(*affine_image(self, matrix, shift))
 
     def minkowski_sum(self, Q: Rows) -> Self:
-        """``{x + y : x in P, y in Q}``, exact.
+        """``{x + y : x in P, y in Q}``: exact where both are computed with in integers, else outward.
 
-        Fourier-Motzkin from 2 n coordinates while that is cheap, then the hull of all sums of vertices (bounded sets).
+        In integers the hull of all sums of vertices; else normals by Fourier-Motzkin from 2 n coordinates while that is
+        cheap, then by the hull of all sums of vertices, and the sum of the supports along them.
         """
-        return type(self)(*combinations.minkowski_sum(self, same_space(self, Q)))
+        return type(self)(*minkowski_sum(self, same_space(self, Q)))
 
     def pontryagin_difference(self, Q: Rows) -> Self:
         """``{x : x + y in P for all y in Q}``: one linear program per row; the whole space if Q is empty.
 
-        An equality of P survives only if it is constant over Q, to 1e-12 of its size.
+        An equality of P survives only if it is constant over Q (to 1e-12 of its size, unless all numbers are short).
+        Supports are exact, and what remains rounded up, where the numbers are short or the result is nearly flat.
         """
-        return type(self)(*combinations.pontryagin_difference(self, same_space(self, Q)))
+        return type(self)(*pontryagin_difference(self, same_space(self, Q)))
 
     def project(self, keep: Sequence[int], method: str = "auto", max_rows: int = 20_000, outer: bool = False) -> Self:
         """Projection ``{x_keep : x in P}``, exact, on the coordinates `keep` in their order.
@@ -364,13 +385,13 @@ class HPolytope(Rows):
     def outer_template(self, directions: ArrayLike) -> Self:
         """Smallest set ``{x : T x <= h}`` with the given normals (k, n) that contains this one.
 
-        Normals along which this set is unbounded are left out; offsets are rounded outward (128 units of last place).
-        One program a normal.
+        Normals along which this set is unbounded are left out; offsets are exact or rounded outward (see
+        `upper_supports`).  One program a normal.
         """
         normals = real_array("directions", directions, ("k", self.dim))
         if not support_functions.known_nonempty(self):
             return type(self).empty(self.dim)
-        return type(self)(*support_functions.outer_template(self, normals))
+        return type(self)(*outer_template(self, normals))
 
     def plot(self, ax: Any = None, dims: Sequence[int] = (0, 1), **style: Any) -> list[Any]:
         """Draw the projection on two or three coordinates; returns the matplotlib artists.

@@ -13,8 +13,7 @@ from polytopes.redundancy import irredundant
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _FLAT = 1e-12  # relative width below which points are taken to lie in a subspace
-_THIN = 1e-6  # relative width below which rounding is no longer small beside it
-_OUTWARD = 4.0 * float(np.finfo(np.float64).eps)
+_EPS = float(np.finfo(np.float64).eps)
 _NOISE = 1e-15  # width of a coordinate, relative to the largest one, that may be rounding
 _SLIVER = 1e-5  # relative volume and least edge of a simplex that fixes its hyperplane
 _TOUCHING = 1e-13  # distance from a hyperplane at which a point lies on it (widths are about one)
@@ -22,50 +21,68 @@ _ALIKE = 1e-6  # distance between two rows below which they may be one facet
 _REACHED = 1e-11  # a facet is final if no point of the set lies this far beyond it (widths are about one)
 
 
-def rows_of_points(V: Floats, dimension: Callable[[], int] | None = None) -> tuple[Floats, Floats, Floats, Floats]:
-    """Rows A, b, C, d of the convex hull of points (k, n), k >= 1.
+def outer_rows(V: Floats, offsets: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+    """Rows A, b of a set that contains the one of which the points (k, n) are all vertices, or nearly so.
 
-    Every right-hand side is the maximum over the points, so that each point satisfies its rows to rounding.  Where the
-    hull is thinner than 1e-6 of its size, they are rounded outward by 4 units of the last place of the terms of
-    ``a'x``: points that were rounded stand for a set, which must not be missed by a good part of its width.
+    The points only tell the normals.  Where they lie within 1e-12 of their spread of a subspace, the set is held in a
+    slab about it: the facets are those of the points' shadow on the subspace.
 
     Parameters
     ----------
-    V : array (k, n)
-    dimension : callable, optional
-        Tells the dimension of the hull where it is known exactly and points within 1e-12 of their spread of a subspace
-        leave it open; without it they give explicit equalities.
+    V : array (k, n), k >= 1
+    offsets : callable
+        Upper bounds of the set's supports along normals (m, n).
     """
+    normals, across = hull_normals(V)
+    rows = np.vstack([normals, across, -across])
+    return rows, offsets(rows)
+
+
+def hull_normals(V: Floats) -> tuple[Floats, Floats]:
+    """Unit normals of the facets of points (k, n), and of the subspace that they nearly lie in (none, if n wide)."""
     n = V.shape[1]
-    centre = V.mean(axis=0)
     scale = axis_scales(V)
-    offsets = (V - centre) / scale
+    offsets = (V - V.mean(axis=0)) / scale
     sizes, axes = principal_axes(offsets)
-    rank = int(np.count_nonzero(sizes > _FLAT * sizes[0]))
-    if rank < n and dimension is not None:
-        rank = dimension()
-        sizes = np.maximum(sizes, _NOISE * (sizes[0] or 1.0))
-    C = _unit(axes[rank:] / scale)
-    d = C @ centre
+    rank = numeric_rank(sizes)
+    across = _unit(axes[rank:] / scale)
     if rank == 0:
-        return np.empty((0, n)), np.empty(0), np.eye(n), V[0].copy()
+        return np.empty((0, n)), across
     found = _facets(offsets @ axes[:rank].T / sizes[:rank])
     rows = found.rows[:, :-1]
     if not found.certain():
         rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(rank))]
-    normals = _unit(rows / sizes[:rank] @ axes[:rank] / scale)
-    b = (V @ normals.T).max(axis=0)
-    if sizes[rank - 1] < _THIN * sizes[0]:
-        b += _OUTWARD * (np.abs(normals) @ np.abs(V).max(axis=0))
-    return normals, b, C, d
+    return _unit(rows / sizes[:rank] @ axes[:rank] / scale), across
 
 
-def normals_of_span(directions: Floats) -> Floats:
-    """Unit normals (n - rank, n) of the span of directions (k, n), which may lie 1e-12 of their spread beside it."""
-    both = np.vstack([directions, -directions])
+def nearly_flat(V: Floats, rays: Floats) -> Floats:
+    """Unit normals of the subspace that points (k, n) and rays (r, n) lie within 1e-12 of their spread of.
+
+    The rays are taken to be about as long as the points are spread.
+    """
+    longest = np.abs(rays).max(axis=1, keepdims=True)
+    spread = np.ptp(V, axis=0).max() or 1.0
+    ahead = V.mean(axis=0) + rays / np.where(longest > 0.0, longest, 1.0) * spread
+    both = np.vstack([V, ahead])
     scale = axis_scales(both)
-    sizes, axes = principal_axes(both / scale)
-    return _unit(axes[np.count_nonzero(sizes > _FLAT * sizes[0]) :] / scale)
+    sizes, axes = principal_axes((both - V.mean(axis=0)) / scale)
+    return _unit(axes[numeric_rank(sizes) :] / scale)
+
+
+def numeric_rank(sizes: Floats) -> int:
+    """How many of the sizes, widest first, are more than 1e-12 of the widest."""
+    return int(np.count_nonzero(sizes > _FLAT * sizes[0]))
+
+
+def point_offsets(V: Floats) -> Callable[[Floats], Floats]:
+    """Upper bounds of the supports of points (k, n), rounding included."""
+    size, unit = np.abs(V).max(axis=0), (V.shape[1] + 2) * _EPS
+
+    def offsets(normals: Floats) -> Floats:
+        bounds: Floats = (V @ normals.T).max(axis=0) + unit * (np.abs(normals) @ size)
+        return bounds
+
+    return offsets
 
 
 def _unit(rows: Floats) -> Floats:
@@ -127,12 +144,11 @@ def _facets(points: Floats) -> _Facets:
     return _Facets(points, rows, simplices, number.ravel(), corners)
 
 
-def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
-    """Minimal rows of a bounded, full-dimensional set from its support points.
+def normals_by_supports(oracle: Oracle, inner: Floats) -> Floats:
+    """Unit normals (m, n) of the facets of a bounded, full-dimensional set from its support points.
 
     The hull of a few support points is refined: a support point along the normal of every facet either confirms the
-    facet or lies beyond it and is added.  Every row returned is a supporting half-space of the set, so the result
-    contains it.
+    facet or lies beyond it and is added.
 
     Parameters
     ----------
@@ -140,15 +156,10 @@ def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
         Directions (k, n) to a maximiser for each, (k, n).
     inner : array (n,)
         A point strictly inside.
-
-    Returns
-    -------
-    A, b : arrays (m, n) and (m,)
     """
     n = inner.size
     if n == 1:
-        ends = oracle(np.array([[1.0], [-1.0]]))[:, 0]
-        return np.array([[1.0], [-1.0]]), ends * [1.0, -1.0]
+        return np.array([[1.0], [-1.0]])
     frame = unit_frame(oracle, inner)
     axes = np.linalg.inv(frame)
 
@@ -160,9 +171,7 @@ def hull_by_supports(oracle: Oracle, inner: Floats) -> tuple[Floats, Floats]:
     rows = found.rows[:, :-1]
     if not found.certain():
         rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(n))]
-    normals = rows @ axes
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return normals, (normals * oracle(normals)).sum(axis=1)
+    return _unit(rows @ axes)
 
 
 def _refined(oracle: Oracle, n: int) -> _Facets:

@@ -240,7 +240,7 @@ class Program:
         solved = np.array([name == OPTIMAL for name in status], dtype=bool)
         values = np.where(solved, (directions * lifted).sum(axis=1), np.inf)
         for q in np.flatnonzero(~solved).tolist():
-            if status[q] == UNDECIDED:
+            if status[q] == UNDECIDED or self.thin:  # of a thin set, floats take an edge for a ray
                 status[q], values[q], lifted[q], multipliers[q] = program._maximise_carefully(directions[q], reduced[q])
         return Maxima(values, lifted, multipliers, status)
 

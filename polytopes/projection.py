@@ -25,9 +25,11 @@ from polytopes.affine_hull import explicit
 from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
 from polytopes.fourier_motzkin import eliminate
-from polytopes.hull import hull_by_supports, rows_of_points
+from polytopes.hull import normals_by_supports, outer_rows
+from polytopes.outer_supports import upper_supports
+from polytopes.outer_template import outer_template
 from polytopes.rows import Rows
-from polytopes.support import known_nonempty, maxima, outer_template
+from polytopes.support import known_nonempty, maxima
 from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
@@ -106,9 +108,10 @@ def _project_body(
     if method == "auto":
         return _project_automatically(P, k, inner, max_rows, outer)
     if method == "vertices":
-        return rows_of_points(vertices(P)[:, :k], lambda: k)[:2]
+        return outer_rows(vertices(P)[:, :k], lambda normals: upper_supports(P, _lifted(normals, P.dim)))
     if method == "convex-hull":
-        return hull_by_supports(lambda directions: _shadow_points(P, directions), inner[:k])
+        normals = normals_by_supports(lambda directions: _shadow_points(P, directions), inner[:k])
+        return normals, upper_supports(P, _lifted(normals, P.dim))
     try:
         return eliminate(P.A, P.b, list(range(k, P.dim)), inner, max_rows)
     except ProjectionLimitError:
@@ -139,10 +142,15 @@ def _method_for_dense_rows(P: Rows, k: int) -> str:
 def _shadow_points(P: Rows, directions: Floats) -> Floats:
     """Projected support points along directions (m, k) of the shadow."""
     k = directions.shape[1]
-    result = maxima(P, np.hstack([directions, np.zeros((len(directions), P.dim - k))]))
+    result = maxima(P, _lifted(directions, P.dim))
     if result is None or not np.isfinite(result.values).all():
         raise UnboundedError("the projection is unbounded; only method='fourier-motzkin' can describe it.")
     return result.points[:, :k]
+
+
+def _lifted(directions: Floats, n: int) -> Floats:
+    """Directions (m, k) of the shadow in the n coordinates of the set."""
+    return np.hstack([directions, np.zeros((len(directions), n - directions.shape[1]))])
 
 
 def _template(P: Rows, k: int) -> tuple[Floats, Floats]:

@@ -9,9 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes.checks import real_array
 from polytopes.emptiness import Emptiness, decide_emptiness
+from polytopes.exact_generators import exact_generators
 from polytopes.linear_program import Program, prepare
+from polytopes.minkowski_weyl import ExactGenerators
 
 Floats = NDArray[np.float64]
+Table = tuple[Floats, Floats, Floats, Floats]
+"""Rows A, b, C, d: what the operations hand to the constructor of a set."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,9 +68,24 @@ class Rows:
         """Emptiness of the rows, decided once."""
         return decide_emptiness(self, self.program)
 
+    @cached_property
+    def exact(self) -> ExactGenerators | None:
+        """The generators in integers, where the set is computed with in integers; see `exact_generators`."""
+        return exact_generators(self.A, self.b, self.C, self.d, self.program)
+
     def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
         """The same equalities with other inequalities."""
         return type(self)(A, b, self.C, self.d)
+
+
+def nothing(n: int) -> Table:
+    """Rows of the empty set of R^n, ``0'x <= -1``."""
+    return np.zeros((1, n)), np.array([-1.0]), np.empty((0, n)), np.empty(0)
+
+
+def everything(n: int) -> Table:
+    """Rows of R^n: none."""
+    return np.empty((0, n)), np.empty(0), np.empty((0, n)), np.empty(0)
 
 
 def same_space(P: Rows, Q: Rows) -> Rows:

@@ -1,4 +1,4 @@
-"""Support function, support points and what follows from them: bounding box, boundedness, largest ball, template.
+"""Support function, support points and what follows from them: bounding box, boundedness, largest ball.
 
 The support function of P is ``h_P(c) = max {c'x : x in P}``: +inf where P is unbounded along c, -inf if P is empty.
 """
@@ -14,7 +14,6 @@ from polytopes.linear_program import UNDECIDED, Maxima
 from polytopes.rows import Rows
 
 Floats = NDArray[np.float64]
-_OUTWARD = 128.0 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,26 +146,3 @@ def chebyshev(P: Rows) -> Ball:
     if not interior.reliable:
         raise UndecidedError("no solver found a largest ball.")
     return Ball(interior.point.copy(), max(interior.radius, 0.0))
-
-
-def outer_offsets(P: Rows, directions: Floats) -> Floats:
-    """Supports of the nonempty P along directions (k, n), +inf where unbounded.
-
-    Rounded outward by 128 units of the last place of the terms of ``c'x``, so that the template of a flat set keeps its
-    points.
-    """
-    result = maxima(P, directions)
-    assert result is not None
-    finite = np.isfinite(result.values)
-    reach = np.where(finite, np.abs(result.points).max(axis=1, initial=0.0), 0.0)
-    return result.values + _OUTWARD * reach * np.abs(directions).sum(axis=1)
-
-
-def outer_template(P: Rows, directions: Floats) -> tuple[Floats, Floats]:
-    """Rows ``T x <= h_P(T)`` of the smallest polytope with the given normals that contains the nonempty P.
-
-    Directions in which P is unbounded give no row; values are rounded outward (see `outer_offsets`).
-    """
-    offsets = outer_offsets(P, directions)
-    finite = np.isfinite(offsets)
-    return directions[finite], offsets[finite]

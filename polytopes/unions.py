@@ -3,35 +3,65 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from polytopes import combinations
 from polytopes.checks import real_array
+from polytopes.generators import in_integers
 from polytopes.hpolytope import HPolytope
-from polytopes.rows import same_space
-from polytopes.support import known_nonempty, outer_offsets
+from polytopes.hull import outer_rows
+from polytopes.minkowski_weyl import union
+from polytopes.outer_supports import upper_supports
+from polytopes.outward import float_rows
+from polytopes.rows import Rows, Table, nothing, same_space
+from polytopes.support import is_bounded, known_nonempty
+from polytopes.vertices import vertices
+
+Floats = NDArray[np.float64]
 
 
 def convex_hull(sets: Sequence[HPolytope]) -> HPolytope:
-    """Closed convex hull of a union; empty sets add nothing.
+    """Closed convex hull of a union, ``conv(V_1, ..., V_k) + cone(R_1, ..., R_k)``; empty sets add nothing.
 
-    Bounded sets: the hull of their vertices.  Otherwise a projection of the lifted form of Balas (1985), in as many
-    coordinates as all sets together.
+    In integers, and exact where the result is floats, if all sets are computed with in integers or one is unbounded;
+    else the hull of the vertices tells the normals, and the largest support of a set along each is rounded up.
 
     Parameters
     ----------
     sets : sequence of HPolytope
         At least one, all of one dimension.
+
+    Raises
+    ------
+    UndecidedError
+        If a set is unbounded and the double description of it or of the hull too large.
     """
     _checked(sets)
-    return HPolytope(*combinations.hull_of_union(sets))
+    return HPolytope(*_hull_rows(sets))
+
+
+def _hull_rows(sets: Sequence[Rows]) -> Table:
+    n = sets[0].dim
+    some = [P for P in sets if known_nonempty(P)]
+    if not some:
+        return nothing(n)
+    if len(some) == 1:
+        return some[0].A, some[0].b, some[0].C, some[0].d
+    if all(P.exact is not None for P in some) or not all(is_bounded(P) for P in some):
+        return float_rows(union([in_integers(P) for P in some]))
+    points = np.vstack([vertices(P) for P in some])
+    return *outer_rows(points, lambda normals: _largest_supports(some, normals)), np.empty((0, n)), np.empty(0)
+
+
+def _largest_supports(sets: Sequence[Rows], normals: Floats) -> Floats:
+    largest: Floats = np.max([upper_supports(P, normals) for P in sets], axis=0)
+    return largest
 
 
 def union_bounds(sets: Sequence[HPolytope], directions: ArrayLike | None = None) -> HPolytope:
     """Smallest set ``{x : T x <= h}`` with the given normals that contains every set: ``h`` is the largest support.
 
     One linear program for each set and normal, where `convex_hull` needs vertices.  Normals along which a set is
-    unbounded are left out; offsets are rounded outward (128 units of last place).
+    unbounded are left out; offsets are exact or rounded outward (see `upper_supports`).
 
     Parameters
     ----------
@@ -47,7 +77,7 @@ def union_bounds(sets: Sequence[HPolytope], directions: ArrayLike | None = None)
     some = [P for P in sets if known_nonempty(P)]
     if not some:
         return HPolytope.empty(n)
-    offsets = np.max([outer_offsets(P, normals) for P in some], axis=0)
+    offsets = _largest_supports(some, normals)
     finite = np.isfinite(offsets)
     return HPolytope(normals[finite], offsets[finite])
 

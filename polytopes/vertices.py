@@ -1,7 +1,7 @@
-"""Vertices of bounded sets.
+"""Vertices of bounded sets: in integers where the rows are short or the set is flat or thin (see `exact_generators`).
 
-Qhull does the combinatorics (the hull of the dual points), on coordinates centred in the set and scaled to about unit
-size along its own axes; flat sets are handled in their subspace.  Points are never rounded on the way.
+Elsewhere Qhull does the combinatorics (the hull of the dual points), on coordinates centred in the set and scaled to
+about unit size along its own axes; flat sets are handled in their subspace.  Points are never rounded on the way.
 """
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from polytopes.affine_hull import explicit
 from polytopes.errors import UnboundedError, UndecidedError
 from polytopes.frame import UnitBody, unit_body
+from polytopes.integers import floats_of_points
 from polytopes.qhull import dual_hull
 from polytopes.redundancy import facets
 from polytopes.rows import Rows
@@ -34,6 +35,9 @@ def vertices(P: Rows) -> Floats:
         return np.empty((0, P.dim))
     if not is_bounded(P):
         raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
+    if P.exact is not None:
+        listed_exactly = floats_of_points(P.exact.vertices)
+        return listed_exactly[np.lexsort(listed_exactly.T[::-1])]
     flat = explicit(P)
     program = flat.program.balanced
     free = program.flat.free

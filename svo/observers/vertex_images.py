@@ -91,7 +91,8 @@ def _exact_image(joint: HPolytope, M: Array, t: Array, max_facets: int | None) -
     back = np.linalg.inv(A)
     nw = E.shape[1]
     inverse = np.block([[back, -back @ E], [np.zeros((nw, n)), np.eye(nw)]])
-    lifted = joint.preimage(inverse, np.concatenate([-back @ t, np.zeros(nw)]))
+    shift = np.concatenate([-back @ t, np.zeros(nw)])  # the rounding of these rows is small beside what `outward` adds
+    lifted = HPolytope(joint.A @ inverse, joint.b - joint.A @ shift, joint.C @ inverse, joint.d - joint.C @ shift)
     rows = _EXACT_ROWS if max_facets is None else _BUDGET_ROWS
     try:
         return lifted.project(range(n), "fourier-motzkin", rows, max_facets is not None)

@@ -129,8 +129,9 @@ def test_generators(kind: str, count: int) -> None:
         G, expected = P.generators(), list(exact.minimized_generators())
         counts = len(G.vertices), len(G.rays), len(G.lines)
         assert counts == tuple(sum(map(k, expected)) for k in (is_point, is_ray, is_line)), case
-        again = HPolytope.from_vertices(G.vertices, np.vstack([G.rays, G.lines, -G.lines]))
-        assert_exact(again, exact, case)
+        again = polyhedron(HPolytope.from_vertices(G.vertices, np.vstack([G.rays, G.lines, -G.lines])))
+        whole = (G.vertices * 2**20 % 1.0 == 0.0).all()  # no vertex was rounded
+        assert again == exact or (not whole and within(again, exact, 1e-9) and within(exact, again, 1e-9)), case
 
 
 def is_point(g: ppl.Generator) -> bool:

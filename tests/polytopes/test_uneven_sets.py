@@ -178,7 +178,7 @@ def test_a_hull_is_flat_only_if_the_union_is() -> None:
 @pytest.mark.parametrize("width", [0.0, 1e-13, 1.0])
 def test_a_sum_by_vertices_is_flat_only_if_the_sum_is(monkeypatch: pytest.MonkeyPatch, width: float) -> None:
     """A part of a plane, and beside the plane a segment or a slab parallel to it."""
-    monkeypatch.setattr("polytopes.combinations._CHEAP_ROWS", 1)
+    monkeypatch.setattr("polytopes.minkowski_sum._CHEAP_ROWS", 1)
     box, normal = HPolytope.box([-1.0] * 3, [1.0] * 3), np.array([1.0, 2.0, 3.0])
     P = HPolytope(box.A, box.b, [normal], [0.5])
     if width == 0.0:

@@ -1,0 +1,47 @@
+"""Which sets are computed with in integers, and their generators.
+
+Short rows, of few bits, come out as floats again.  Longer ones, such as decimals, cost more and are rounded outward in
+the end, so they are taken only where floats cannot decide: flat, thin and unbounded sets.
+"""
+
+import numpy as np
+
+from polytopes.errors import UndecidedError
+from polytopes.integers import Floats, integer_rows, short
+from polytopes.linear_program import Program
+from polytopes.minkowski_weyl import ExactGenerators, ExactRows, generators_of
+
+SHORT_RAYS = 2_000
+"""Rays of the double description beyond which a set of short rows is left to floats, if they can decide."""
+LONG_RAYS = 500
+"""The same for longer rows."""
+_LONG_ROWS = 100
+_COORDINATES = 16
+_WIDE = 1e-6  # radius of a largest ball, relative to the size of b, from which rounding is small beside it
+
+
+def exact_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Program) -> ExactGenerators | None:
+    """Generators of a set ``{x : A x <= b, C x = d}`` in integers; None where it is left to floats."""
+    if A.shape[1] > _COORDINATES:
+        return None
+    rows = integer_form(A, b, C, d)
+    plain = short(rows.inequalities) and short(rows.equalities)
+    if not plain and (b.size + d.size > _LONG_ROWS or _decidable(program)):
+        return None
+    try:
+        return generators_of(rows, SHORT_RAYS if plain else LONG_RAYS)
+    except UndecidedError:
+        return None
+
+
+def integer_form(A: Floats, b: Floats, C: Floats, d: Floats) -> ExactRows:
+    """Rows ``A x <= b``, ``C x = d`` as primitive integers."""
+    return ExactRows(integer_rows(np.hstack([A, b[:, None]])), integer_rows(np.hstack([C, d[:, None]])))
+
+
+def _decidable(program: Program) -> bool:
+    """Whether floats know the set well: full-dimensional, wide against their rounding, bounded."""
+    axes = np.eye(program.flat.dim)
+    if program.flat.pivots or not program.fat or program.interior.radius <= _WIDE * program.size:
+        return False
+    return bool(np.isfinite(program.maximise(np.vstack([axes, -axes])).values).all())

@@ -1,0 +1,112 @@
+"""Floats as integers and back: every float is an integer times a power of two."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes.double_description import Integers, primitive
+
+Floats = NDArray[np.float64]
+SHORT = 2**32
+"""Rows whose primitive integers stay below are short: sets of short rows are computed with exactly."""
+
+_LARGE = 32  # bits
+_BITS = 53  # of a float
+_EXACT = 2.0**_BITS
+_WIDE = 2.0**62  # integers that an int64 holds
+_FARTHEST = 1000  # powers of two that a float may be multiplied by
+
+
+def integer_rows(table: Floats) -> Integers:
+    """Each row (m, n) as primitive integers, up to a positive factor; machine integers where all of them fit."""
+    if not table.size:
+        return np.zeros(table.shape, dtype=np.int64)
+    lowest, highest = _lowest_bit(table).min(axis=1, initial=0), np.frexp(table)[1].max(axis=1, initial=0)
+    if (lowest > -_FARTHEST).all() and (highest - lowest < _FARTHEST).all():
+        whole = np.ldexp(table, -lowest[:, None])
+        if np.abs(whole).max() < _WIDE:
+            return primitive(whole.astype(np.int64))
+        return primitive(np.array([[int(v) for v in row] for row in whole.tolist()], dtype=object))
+    rows = np.zeros(table.shape, dtype=object)
+    for i, values in enumerate(table.tolist()):
+        ratios = [v.as_integer_ratio() for v in values]
+        common = max((q for _, q in ratios), default=1)
+        rows[i] = [p * (common // q) for p, q in ratios]
+    return primitive(rows)
+
+
+def _lowest_bit(table: Floats) -> NDArray[np.int64]:
+    """Exponent of the lowest bit of each entry; of a zero, a large one that never is the least."""
+    parts, exponents = np.frexp(np.abs(table))
+    whole = (parts * _EXACT).astype(np.int64)
+    trailing = np.frexp((whole & -whole).astype(np.float64))[1] - 1
+    found: NDArray[np.int64] = np.where(whole == 0, 0, trailing + exponents.astype(np.int64) - 53)
+    return found
+
+
+def short(rows: Integers) -> bool:
+    """Whether rows are so short that results in their integers are, as a rule, floats again."""
+    return rows.dtype != object and int(np.abs(rows).max(initial=0)) < SHORT
+
+
+def is_short(*tables: Floats) -> bool:
+    """Whether the rows ``A x <= b`` of tables A, b, C, d, ... are short."""
+    pairs = zip(tables[::2], tables[1::2], strict=True)
+    return all(short(integer_rows(np.hstack([rows, sides[:, None]]))) for rows, sides in pairs)
+
+
+def exact_product(A: Floats, M: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """``A M`` and, for each entry, whether no rounding can have happened: all terms are multiples of one power of two
+    and, together, below 2^53 of it.
+    """
+    rows, columns = _lowest_bit(A).min(axis=1, initial=0), _lowest_bit(M).min(axis=0, initial=0)
+    with np.errstate(over="ignore"):
+        limit = np.ldexp(_EXACT, rows[:, None] + columns[None])
+    return A @ M, np.abs(A) @ np.abs(M) <= limit
+
+
+def are_floats(row: Sequence[int]) -> bool:
+    """Whether each integer is a float, up to one power of two for all of them."""
+    return all(v == 0 or abs(v).bit_length() - _trailing(v) <= 53 for v in row) and _span(row) < _FARTHEST
+
+
+def _trailing(v: int) -> int:
+    return (v & -v).bit_length() - 1
+
+
+def _span(row: Sequence[int]) -> int:
+    lengths = [abs(v).bit_length() for v in row if v]
+    return max(lengths, default=0)
+
+
+def whole_numbers(vector: Floats) -> tuple[NDArray[np.object_], int]:
+    """Integers and an exponent k >= 0: the floats are the integers over 2^k."""
+    ratios = [v.as_integer_ratio() for v in vector.tolist()]
+    exponent = max(q.bit_length() - 1 for _, q in ratios)
+    return np.array([p << (exponent - (q.bit_length() - 1)) for p, q in ratios], dtype=object), exponent
+
+
+def up(value: Fraction | float) -> float:
+    """The least float not below a number."""
+    nearest = float(value)
+    return nearest if nearest >= value else float(np.nextafter(nearest, np.inf))
+
+
+def as_floats(row: list[int], normal: list[int]) -> Floats:
+    """Integers to the nearest floats; over a power of two, if those of the normal are large."""
+    largest = max(abs(v) for v in normal).bit_length()
+    divisor = 1 << largest if largest > _LARGE else 1
+    return np.array([v / divisor for v in row], dtype=np.float64)
+
+
+def floats_of_points(points: Integers) -> Floats:
+    """Points ``[x, t]`` (k, n + 1) to the nearest floats x / t (k, n)."""
+    values = [[v / row[-1] for v in row[:-1]] for row in points.tolist()]
+    return np.array(values, dtype=np.float64).reshape(len(points), points.shape[1] - 1)
+
+
+def floats_of_directions(rays: Integers) -> Floats:
+    """Directions (r, n) to the nearest floats, large ones over a power of two."""
+    return np.array([as_floats(row, row) for row in rays.tolist()]).reshape(rays.shape)

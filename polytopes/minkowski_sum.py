@@ -1,0 +1,62 @@
+"""The Minkowski sum ``P + Q = {x + y : x in P, y in Q}``, whose support is the sum of the supports."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes.errors import ProjectionLimitError
+from polytopes.generators import in_integers
+from polytopes.hull import hull_normals
+from polytopes.minkowski_weyl import total
+from polytopes.outer_supports import upper_supports
+from polytopes.outward import float_rows
+from polytopes.projection import project
+from polytopes.rows import Rows, Table, nothing
+from polytopes.support import is_bounded, known_nonempty
+from polytopes.vertices import vertices
+
+Floats = NDArray[np.float64]
+_MAX_SUMS = 4_000  # sums of vertices up to which integers are affordable
+_CHEAP_ROWS = 1000
+
+
+def minkowski_sum(P: Rows, Q: Rows) -> Table:
+    """Rows A, b, C, d of the sum.
+
+    In integers, the hull of all sums of vertices and of all rays and lines, where both sets are computed with in
+    integers or one is unbounded.  Else both are bounded and one is full-dimensional: elimination of y from
+    ``{(z, y) : z - y in P, y in Q}`` gives the normals a while that is cheap, then the sums of vertices do (half the
+    time of the hull of support points where both were measured); ``h_P(a) + h_Q(a)`` is rounded up.
+
+    Raises
+    ------
+    UndecidedError
+        If a set is unbounded and the double description of it or of the sum too large.
+    """
+    if not (known_nonempty(P) and known_nonempty(Q)):
+        return nothing(P.dim)
+    first, second = P.exact, Q.exact
+    if first is not None and second is not None and len(first.vertices) * len(second.vertices) <= _MAX_SUMS:
+        return float_rows(total(first, second))
+    if not (is_bounded(P) and is_bounded(Q)):
+        return float_rows(total(in_integers(P), in_integers(Q)))
+    normals = _normals(P, Q)
+    supports = upper_supports(P, normals) + upper_supports(Q, normals)
+    return normals, np.nextafter(supports, np.inf), np.empty((0, P.dim)), np.empty(0)
+
+
+def _normals(P: Rows, Q: Rows) -> Floats:
+    """Normals of the facets of a bounded sum, and of a subspace that it nearly lies in."""
+    n = P.dim
+    lifted = Rows(
+        np.vstack([np.hstack([P.A, -P.A]), np.hstack([np.zeros((Q.b.size, n)), Q.A])]),
+        np.concatenate([P.b, Q.b]),
+        np.vstack([np.hstack([P.C, -P.C]), np.hstack([np.zeros((Q.d.size, n)), Q.C])]),
+        np.concatenate([P.d, Q.d]),
+    )
+    try:
+        A, _, C, _ = project(lifted, range(n), "fourier-motzkin", _CHEAP_ROWS, False)
+        return np.vstack([A, C, -C])
+    except ProjectionLimitError:
+        sums = vertices(P)[:, None, :] + vertices(Q)
+        facets, across = hull_normals(sums.reshape(-1, n))
+        return np.vstack([facets, across, -across])

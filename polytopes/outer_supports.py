@@ -1,0 +1,138 @@
+"""Upper bounds of the support function that no rounding undercuts.
+
+For x in ``{A x <= b, C x = d}`` and multipliers y >= 0 and z, weak duality says ``c'x <= y'b + z'd + r'|x|`` with
+``r = |c - A'y - C'z|``.  Multipliers of float programs leave an r of some rounding errors, so a bound of |x| makes it a
+bound of ``c'x``; along the axes it bounds |x| itself.  Where there is no such bound (the set is unbounded) or it is not
+sharp (the set is thin) the support is exact: from the generators in integers, or by the rational simplex.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from polytopes.errors import UndecidedError
+from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
+from polytopes.integers import up
+from polytopes.linear_program import Maxima
+from polytopes.outward_normals import support_of
+from polytopes.rows import Rows
+from polytopes.support import maxima
+
+Floats = NDArray[np.float64]
+_EPS = float(np.finfo(np.float64).eps)
+_SHARP = 1e-7  # of the radius of a largest ball: rounding beyond, and the support is worth rational arithmetic
+_TINY = float(np.finfo(np.float64).tiny)
+
+
+def upper_supports(P: Rows, directions: Floats, uncertain: Floats | None = None) -> Floats:
+    """Upper bounds (k,) of the supports of a nonempty set along directions (k, n); +inf where it is unbounded.
+
+    Parameters
+    ----------
+    P : Rows
+    directions : array (k, n)
+    uncertain : array (k, n), optional
+        Each entry of the directions may be off by so much (bounded sets only).
+
+    Raises
+    ------
+    UndecidedError
+        If a support could not be found.
+    """
+    if uncertain is None and P.exact is not None:
+        return np.array([up(support_of(P.exact, row)) for row in directions])
+    bounds, sharp = _by_duality(P, directions, np.zeros_like(directions) if uncertain is None else uncertain)
+    for k in np.flatnonzero(~sharp):
+        value = None if uncertain is not None and uncertain[k].any() else _by_simplex(P, directions[k])
+        if value is None and not np.isfinite(bounds[k]):
+            raise UndecidedError(f"no bound of the support in direction {directions[k].tolist()} was proved.")
+        bounds[k] = bounds[k] if value is None else up(value)
+    return bounds
+
+
+def reach(P: Rows, moved: Floats | None = None) -> Floats | None:
+    """Bounds (n,) of |x| over a nonempty set; None if none is proved.
+
+    Parameters
+    ----------
+    P : Rows
+    moved : array (m + q, n + 1), optional
+        Each entry of the rows ``[A, b]`` and ``[C, d]`` may be off by so much.
+    """
+    axes = np.vstack([np.eye(P.dim), -np.eye(P.dim)])
+    best = maxima(P, axes)
+    return None if best is None else _proved_reach(best.values, *_duality(P, axes, best, moved))
+
+
+def _by_duality(P: Rows, directions: Floats, uncertain: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Bounds by the multipliers of float programs, and whether each is sharp; inf and False where there is none."""
+    n = P.dim
+    rows = np.vstack([np.eye(n), -np.eye(n), directions])
+    best = maxima(P, rows)
+    assert best is not None
+    constant, weights = _duality(P, rows, best, None)
+    most = _proved_reach(best.values[: 2 * n], constant[: 2 * n], weights[: 2 * n])
+    if most is None:
+        return np.full(len(directions), np.inf), np.zeros(len(directions), dtype=bool)
+    bounds = constant[2 * n :] + (weights[2 * n :] + uncertain) @ most
+    bounds += 4.0 * _EPS * np.abs(bounds)
+    room = _SHARP * P.program.interior.radius * np.linalg.norm(directions, axis=1)
+    sharp = bounds - best.values[2 * n :] <= room + 2.0 * uncertain @ most
+    return bounds, sharp
+
+
+def _duality(P: Rows, rows: Floats, best: Maxima, moved: Floats | None) -> tuple[Floats, Floats]:
+    """Constants (k,) and weights (k, n) with ``c'x <= constant + weights'|x|`` all over P; rounding is in them."""
+    Y = np.where(np.isfinite(best.values)[:, None], np.maximum(best.multipliers, 0.0), 0.0)
+    Z = np.linalg.lstsq(P.C.T, (rows - Y @ P.A).T, rcond=None)[0].T if P.d.size else np.zeros((len(rows), 0))
+    unit = (np.count_nonzero(Y, axis=1).max() + P.d.size + P.dim + 4) * _EPS
+    sizes = np.abs(np.hstack([np.vstack([P.A, P.C]), np.append(P.b, P.d)[:, None]]))
+    spread = np.hstack([Y, np.abs(Z)]) @ (unit * sizes + (0.0 if moved is None else moved))
+    constant = Y @ P.b + Z @ P.d + spread[:, -1]
+    return constant, np.abs(rows - Y @ P.A - Z @ P.C) + spread[:, :-1] + unit * np.abs(rows)
+
+
+def _proved_reach(values: Floats, constant: Floats, weights: Floats) -> Floats | None:
+    """Bounds (n,) of |x| from those along the axes (2 n of them): a guess that no point can lie on the border of.
+
+    The set is convex and has a point inside, so that none lies beyond either.
+    """
+    if not np.isfinite(values).all():
+        return None
+    sizes = np.abs(values).reshape(2, -1).max(axis=0)
+    guess = 2.0 * sizes + max(float(sizes.max()), _TINY) * 1e-9
+    for _ in range(4):
+        ends = (constant + weights @ guess).reshape(2, -1).max(axis=0)
+        ends += 4.0 * _EPS * np.abs(ends)
+        if (ends < guess).all():
+            return np.asarray(ends)
+        guess = 10.0 * np.maximum(guess, ends)
+    return None
+
+
+def exact_supports(P: Rows, directions: Floats) -> list[Fraction] | None:
+    """Exact supports of a nonempty set along directions in which it is bounded; None if that costs too much."""
+    exact = P.exact
+    found = [support_of(exact, row) if exact is not None else _by_simplex(P, row) for row in directions]
+    fractions = [value for value in found if isinstance(value, Fraction)]
+    return fractions if len(fractions) == len(found) else None
+
+
+def _by_simplex(P: Rows, direction: Floats) -> Fraction | float | None:
+    """The exact support by the rational simplex (inf where it is unbounded); None if that does not end."""
+    start = _exact_start(P)
+    if start is None:
+        return None
+    best = exact_maximum(P.A, P.b, P.program.flat, direction, start)
+    if best.status == "unbounded":
+        return np.inf
+    return Fraction(int(best.value.p), int(best.value.q)) if best.status == "optimal" else None
+
+
+def _exact_start(P: Rows) -> list[fmpq] | None:
+    if not affordable(*P.A.shape):
+        return None
+    start = exact_feasibility(P.A, P.b, P.program.flat, P.program.interior.point)
+    return start.point if start.status == "reached" else None

@@ -1,0 +1,92 @@
+"""Sets of generators in integers by rows in floats: exact where they are floats, up to a factor, and else outward.
+
+A row whose integers are floats stays what it is.  Any other becomes a half-space that holds all generators, near the
+exact one (see `OutwardNormals`); an equality becomes two.  Where the set is thin, but not flat, its facets in integers
+meet at angles below rounding, so that floats near them would bound another set; it is held in a slab instead, cut by
+the facets of its shadow along the slab.
+"""
+
+import numpy as np
+from flint import fmpz_mat
+from numpy.typing import NDArray
+
+from polytopes.double_description import Integers
+from polytopes.hull import nearly_flat
+from polytopes.integers import are_floats, as_floats, floats_of_directions, floats_of_points, integer_rows
+from polytopes.minkowski_weyl import ExactGenerators, ExactRows, rows_of, shadow, stacked
+from polytopes.outward_normals import OutwardNormals
+from polytopes.rows import Table
+
+Floats = NDArray[np.float64]
+
+
+def float_rows(generators: ExactGenerators) -> Table:
+    """Rows A, b, C, d of a set that contains a nonempty one, and is the same where its rows are floats.
+
+    Raises
+    ------
+    UndecidedError
+        At the limit of the double description.
+    """
+    rows = rows_of(generators)
+    equalities = _short_basis(rows.equalities)
+    if not all(are_floats(row[:-1]) for row in [*equalities, *rows.inequalities.tolist()]):
+        directions = floats_of_directions(stacked(generators.rays, generators.lines))
+        across = nearly_flat(floats_of_points(generators.vertices), directions)
+        if generators.dim - len(across) < generators.affine_dim:
+            return _slab(generators, across)
+    return _near_rows(generators, rows.inequalities, equalities)
+
+
+def _near_rows(generators: ExactGenerators, inequalities: Integers, equalities: list[list[int]]) -> Table:
+    """Exact rows where they are floats, and outward ones elsewhere."""
+    normals = OutwardNormals(generators, inequalities[:, :-1])
+    exact = [as_floats(row, row[:-1]) for row in equalities if are_floats(row)]
+    pairs = [sign * v for row in equalities if not are_floats(row) for sign in (1, -1) for v in row[:-1]]
+    sides = np.array(pairs, dtype=object).reshape(-1, generators.dim).tolist()
+    rows = [as_floats(row, row[:-1]) if are_floats(row) else normals.row(row[:-1]) for row in inequalities.tolist()]
+    return _table(rows + [normals.row(side) for side in sides], exact, generators.dim)
+
+
+def _table(inequalities: list[Floats], equalities: list[Floats], n: int) -> Table:
+    A, C = (np.array(part).reshape(-1, n + 1) for part in (inequalities, equalities))
+    return A[:, :-1], A[:, -1], C[:, :-1], C[:, -1]
+
+
+def _short_basis(rows: Integers) -> list[list[int]]:
+    """The same span by rows that are floats where that is easy: the given ones, else those of a reduced lattice."""
+    given: list[list[int]] = rows.tolist()
+    if all(are_floats(row) for row in given):
+        return given
+    reduced = fmpz_mat(len(given), len(given[0]), [v for row in given for v in row]).lll()
+    return [[int(reduced[i, j]) for j in range(len(given[0]))] for i in range(len(given))]
+
+
+def _slab(generators: ExactGenerators, across: Floats) -> Table:
+    """The rows of the shadow along some coordinates, and two for each normal (q, n) of a subspace it nearly lies in."""
+    n = generators.dim
+    kept = _other_coordinates(across)
+    A, b, C, d = float_rows(shadow(generators, kept))
+    facets, fixed = np.zeros((len(A), n)), np.zeros((len(C), n))
+    facets[:, kept], fixed[:, kept] = A, C
+    normals = OutwardNormals(generators, integer_rows(facets))
+    sides = [normals.row(side) for row in integer_rows(across).tolist() for side in (row, [-v for v in row])]
+    slab, _, _, _ = _table(sides, [], n)
+    return np.vstack([facets, slab]), np.append(b, [side[-1] for side in sides]), fixed, d
+
+
+def _other_coordinates(across: Floats) -> list[int]:
+    """Coordinates that fix the others in the subspace with normals (q, n), by pivots of largest size."""
+    work, solved = across.copy(), []
+    for i in range(len(work)):
+        j = int(np.abs(work[i]).argmax())
+        solved.append(j)
+        work[i + 1 :] -= np.outer(work[i + 1 :, j] / work[i, j], work[i])
+    return [j for j in range(across.shape[1]) if j not in solved]
+
+
+def nearest_floats(rows: ExactRows) -> Table:
+    """Rows A, b, C, d to the nearest floats."""
+    inequalities = [as_floats(row, row[:-1]) for row in rows.inequalities.tolist()]
+    equalities = [as_floats(row, row[:-1]) for row in rows.equalities.tolist()]
+    return _table(inequalities, equalities, rows.inequalities.shape[1] - 1)

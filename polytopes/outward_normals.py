@@ -1,0 +1,105 @@
+"""Normals in floats near exact ones, and the supports along them.
+
+A row whose normal is rounded holds all over a set if its right-hand side is the support along the rounded normal,
+which must not rise along a ray or change along a line.  So normals are rounded within those that vanish on the lines,
+and tilted a little towards one that falls along every ray if they rise along one.
+"""
+
+from fractions import Fraction
+from math import gcd
+
+import numpy as np
+from flint import fmpz_mat
+from numpy.typing import NDArray
+
+from polytopes.double_description import Integers, null_space
+from polytopes.integers import Floats, are_floats, as_floats, up, whole_numbers
+from polytopes.minkowski_weyl import ExactGenerators
+
+_BITS = 53  # of a float
+_TILTS = (0, 50, 46, 42, 38, 34, 30)  # exponents of the tilts that are tried, 0 for none
+_LEAST_BITS = 20  # of a normal along lines; below, the lines are missed by rounding instead
+
+
+def support_of(generators: ExactGenerators, normal: Floats) -> Fraction | float:
+    """The exact support of a nonempty set along a normal; inf where it is unbounded."""
+    whole, exponent = whole_numbers(normal)
+    if (products(generators.rays, whole) > 0).any() or products(generators.lines, whole).any():
+        return np.inf
+    values, sizes = products(generators.vertices[:, :-1], whole), generators.vertices[:, -1]
+    return max(map(Fraction, values.tolist(), sizes.tolist())) / (1 << exponent)
+
+
+def products(rows: Integers, whole: NDArray[np.object_]) -> NDArray[np.object_]:
+    product: NDArray[np.object_] = rows.astype(object) @ whole
+    return product
+
+
+class OutwardNormals:
+    """Normals in floats near exact rows of one set.
+
+    Parameters
+    ----------
+    generators : ExactGenerators
+        Of the nonempty set.
+    inner : integers (m, n)
+        Normals of rows of the set, whose sum falls along every ray.
+    """
+
+    def __init__(self, generators: ExactGenerators, inner: Integers) -> None:
+        self._corners = ExactGenerators(generators.vertices, generators.rays[:0], generators.lines[:0])
+        self._rays = generators.rays
+        self._inner = inner.tolist()
+        self._across = null_space(generators.lines)[0].astype(object) if len(generators.lines) else None
+
+    def row(self, normal: list[int]) -> Floats:
+        """A row ``[a, b]`` of floats that holds all over the set, its normal near an exact one."""
+        divisor = gcd(*normal)
+        exact = [v // divisor for v in normal]
+        if are_floats(exact) and not self._rises(as_floats(exact, exact)):
+            rounded = as_floats(exact, exact)
+        else:
+            rounded = self._rounded(exact)
+        return np.append(rounded, up(support_of(self._corners, rounded)))
+
+    def _rises(self, normal: Floats) -> bool:
+        """Whether the normal rises along a ray."""
+        return bool((products(self._rays, whole_numbers(normal)[0]) > 0).any())
+
+    def _rounded(self, exact: list[int]) -> Floats:
+        """The nearest normal that rises along no ray; the nearest one, if only a large tilt would do."""
+        for tilt in _TILTS if len(self._rays) and self._inner else _TILTS[:1]:
+            normal = self._nearest(self._tilted(exact, tilt) if tilt else exact)
+            if not self._rises(normal):
+                return normal
+        return self._nearest(exact)
+
+    def _tilted(self, exact: list[int], bits: int) -> list[int]:
+        """The normal and 2^-bits of one that falls along every ray: the sum of all normals, of one length."""
+        lengths = [max(map(abs, row)).bit_length() for row in self._inner]
+        alike = [[v << (max(lengths) - k) for v in row] for row, k in zip(self._inner, lengths, strict=True)]
+        inner = [sum(column) for column in zip(*alike, strict=True)]
+        size, own = max(map(abs, inner)).bit_length(), max(map(abs, exact)).bit_length()
+        return [(u << (bits + size)) + (v << own) for u, v in zip(exact, inner, strict=True)]
+
+    def _nearest(self, exact: list[int]) -> Floats:
+        """The normal to the nearest floats, or to fewer bits so that it vanishes on the lines."""
+        if self._across is None:
+            return as_floats(exact, exact)
+        weights = _solved(self._across, exact)
+        room = _BITS - max(map(abs, self._across.ravel().tolist())).bit_length() - len(weights).bit_length()
+        if room < _LEAST_BITS:
+            return as_floats(exact, exact)
+        largest = max(abs(w) for w in weights)
+        factor = Fraction(1 << room) / largest
+        whole = np.array([round(w * factor) for w in weights], dtype=object) @ self._across
+        return as_floats(whole.tolist(), whole.tolist())
+
+
+def _solved(basis: Integers, vector: list[int]) -> list[Fraction]:
+    """The weights of a vector in a basis of the space it lies in."""
+    k, n = basis.shape
+    system = fmpz_mat(k, n, basis.ravel().tolist())
+    gram = system * system.transpose()
+    solution = gram.solve(system * fmpz_mat(n, 1, vector))
+    return [Fraction(int(solution[i, 0].p), int(solution[i, 0].q)) for i in range(k)]

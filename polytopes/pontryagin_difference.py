@@ -1,0 +1,74 @@
+"""The Pontryagin difference ``P - Q = {x : x + y in P for all y in Q}``: each row moves inward by the support of Q."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes.integers import is_short, up
+from polytopes.linear_program import Program
+from polytopes.outer_supports import exact_supports
+from polytopes.rows import Rows, Table, everything, nothing
+from polytopes.support import maxima
+
+Floats = NDArray[np.float64]
+_CONSTANT = 1e-12  # relative variation of a linear form over a set that counts as none, unless all numbers are short
+_ROUNDED = 1e-9  # radius of a largest ball, relative to the size of b, from which rounding makes no difference
+
+
+def pontryagin_difference(P: Rows, Q: Rows) -> Table:
+    """Rows A, b, C, d of the difference: ``b - h_Q(a)`` for each row, the whole space if Q is empty.
+
+    An equality ``c'x = d`` of P survives only if ``c'y`` is constant over Q; else nothing is left.  The supports are
+    exact, and what remains is rounded up, where the numbers are short and where rounding could empty what is flat.
+    """
+    rows = np.vstack([P.A, P.C, -P.C])
+    result = maxima(Q, rows)
+    if result is None:
+        return everything(P.dim)
+    if not np.isfinite(result.values).all():
+        return nothing(P.dim)
+    k, q = P.b.size, P.d.size
+    upper, lower = result.values[k : k + q], -result.values[k + q :]
+    if (upper - lower > _CONSTANT * np.maximum(1.0, np.abs(upper))).any():
+        return nothing(P.dim)
+    moved = P.A, P.b - result.values[:k], P.C, P.d - (upper + lower) / 2.0
+    short = is_short(P.A, P.b, P.C, P.d) and is_short(Q.A, Q.b, Q.C, Q.d)
+    if not short and _clear(Rows(*moved).program, P.program.size):
+        return moved
+    exact = exact_supports(Q, rows)
+    return moved if exact is None else _moved(P, exact, short)
+
+
+def _clear(program: Program, size: float) -> bool:
+    """Whether rounding of right-hand sides that were differences of numbers of a size changes nothing of the set."""
+    nearest = abs(program.interior.radius) if program.consistent else 0.0
+    return nearest > _ROUNDED * max(program.size, size)
+
+
+def _moved(P: Rows, supports: Sequence[Fraction], short: bool) -> Table:
+    """The rows of P moved inward by supports along ``[A, C, -C]``, rounded up; an equality so becomes two rows."""
+    k, q = P.b.size, P.d.size
+    if short and any(supports[k + i] != -supports[k + q + i] for i in range(q)):
+        return nothing(P.dim)
+    middles = [(supports[k + i] - supports[k + q + i]) / 2 for i in range(q)]
+    inner = [_row(row, Fraction(b) - h) for row, b, h in zip(P.A, P.b.tolist(), supports[:k], strict=False)]
+    fixed: list[Floats] = []
+    for row, d, middle in zip(P.C, P.d.tolist(), middles, strict=True):
+        above, below = _row(row, Fraction(d) - middle), _row(-row, middle - Fraction(d))
+        if (above == -below).all():
+            fixed.append(above)
+        else:
+            inner += [above, below]
+    A, C = (np.array(part).reshape(-1, P.dim + 1) for part in (inner, fixed))
+    return A[:, :-1], A[:, -1], C[:, :-1], C[:, -1]
+
+
+def _row(row: Floats, side: Fraction) -> Floats:
+    """A row ``[a, b]``, multiplied by the denominator of b if it stays exact then, else b rounded up."""
+    scaled = row * float(side.denominator)
+    exact = [Fraction(v) for v in scaled.tolist()] == [Fraction(v) * side.denominator for v in row.tolist()]
+    if exact and float(side.numerator) == side.numerator:
+        return np.append(scaled, float(side.numerator))
+    return np.append(row, up(side))
