@@ -34,6 +34,7 @@ from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
 METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
+_UNBOUNDED = "the projection is unbounded; only method='fourier-motzkin' can describe it."
 _CHEAP_ROWS = 3000  # rows of one step; beyond, another method was faster in every measured case
 _LISTED = 6  # coordinates up to which the vertices of dense rows are few enough to list
 _FEW = 5  # coordinates up to which listing them always was the fastest
@@ -111,7 +112,10 @@ def _project_body(
         return outer_rows(vertices(P)[:, :k], lambda normals: upper_supports(P, _lifted(normals, P.dim)))
     if method == "convex-hull":
         normals = normals_by_supports(lambda directions: _shadow_points(P, directions), inner[:k])
-        return normals, upper_supports(P, _lifted(normals, P.dim))
+        bounds = upper_supports(P, _lifted(normals, P.dim))
+        if not np.isfinite(bounds).all():
+            raise UnboundedError(_UNBOUNDED)
+        return normals, bounds
     try:
         return eliminate(P.A, P.b, list(range(k, P.dim)), inner, max_rows)
     except ProjectionLimitError:
@@ -144,7 +148,7 @@ def _shadow_points(P: Rows, directions: Floats) -> Floats:
     k = directions.shape[1]
     result = maxima(P, _lifted(directions, P.dim))
     if result is None or not np.isfinite(result.values).all():
-        raise UnboundedError("the projection is unbounded; only method='fourier-motzkin' can describe it.")
+        raise UnboundedError(_UNBOUNDED)
     return result.points[:, :k]
 
 
