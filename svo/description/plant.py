@@ -176,7 +176,8 @@ def _observer_settings(top: Table, model: UncertainModel) -> ObserverSettings:
         template = table.array("template")
     with table.errors():
         # An observer checks its own arguments.
-        WindowObserver(model, HPolytope.box(np.zeros(model.n_states), np.ones(model.n_states)), horizon, template)
+        anywhere = HPolytope.box(np.zeros(model.n_states), np.ones(model.n_states))
+        WindowObserver(model.replace(physical=None, largest=None), anywhere, horizon, template)
     return ObserverSettings(horizon, template)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
 TINY = float(np.finfo(np.float64).tiny)  # covers what underflow takes from a sum
+FAR = 2.0**100
 _PIVOT = 1e-12  # of a constraint's terms: smaller coefficients imply nothing of use about their xi
 
 
@@ -93,8 +94,9 @@ class ConstrainedZonotope:
         spread = np.abs(rows @ self.generators).sum(axis=1) + size @ self.room
         rounding = unit(self.dim + self.generators.shape[1]) * terms + TINY
         room = spread + 2.0 * rounding
-        low = np.where(np.isfinite(lower), lower - known, -room)
-        high = np.where(np.isfinite(upper), upper - known, room)
+        far = FAR * (1.0 + room)  # beyond it a bound that nothing satisfies excludes no less, and overflows nothing
+        low = np.clip(np.where(np.isfinite(lower), lower - known, -room), -far, far)
+        high = np.clip(np.where(np.isfinite(upper), upper - known, room), -far, far)
         half = 0.5 * (high - low) + size @ self.room + rounding + 4.0 * EPS * (np.abs(low) + np.abs(high))
         return replace(
             self,
@@ -164,8 +166,18 @@ class ConstrainedZonotope:
         radius = np.abs(image.generators) @ half + image.room + unit(lower.size) * terms
         return middle - radius, middle + radius
 
-    def is_finite(self) -> bool:
-        return all(np.isfinite(a).all() for a in (self.center, self.generators, self.room, self.constraints))
+    def within(self, limit: float) -> bool:
+        """Whether every coordinate is below a limit in size, constraints left out, and every number finite."""
+        parts = self.center, self.generators, self.room, self.constraints, self.offset, self.slack
+        if not all(np.isfinite(part).all() for part in parts):
+            return False
+        return bool(np.abs(self.interval_hull()).max(initial=0.0) < limit)
+
+    def cut_to(self, lower: Array, upper: Array) -> ConstrainedZonotope:
+        """Points within a box whose bounds may be infinite; those that the interval hull crosses become constraints."""
+        low, high = self.interval_hull()
+        crossed = np.flatnonzero((low < lower) | (high > upper))
+        return self.cut(np.eye(self.dim)[crossed], lower[crossed], upper[crossed]) if crossed.size else self
 
 
 def _rounded_ball(center: Array, radius: Array, terms: int) -> tuple[Array, Array]:

@@ -14,10 +14,11 @@ from polytopes import HPolytope, warm_up
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
-from svo.observers.polytope_sets import Outcome, PublishedRecursion, Recursion, Sample, SoundRecursion
+from svo.observers.polytope_limits import readable, within_physical
+from svo.observers.polytope_restart import RestartingPolytope
+from svo.observers.polytope_sets import PublishedRecursion, Sample, SoundRecursion
 from svo.observers.polytope_state import read_outcome, read_sample, read_set, write_outcome, write_sample, write_set
 from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
-from svo.observers.vertex_images import transitions
 from svo.observers.window_setup import check_first_states, may_be_nonzero
 
 Array = NDArray[np.float64]
@@ -31,7 +32,7 @@ UNSOUND = (
 )
 
 
-class PolytopeObserver:
+class PolytopeObserver(RestartingPolytope):
     """Set-valued observer on explicit polytopes (Rosa and Silvestre 2013, section 2), in a form that is sound.
 
     The set of the next state is the intersection over m = 1..N of the hulls, over the vertices of Delta, of the
@@ -95,7 +96,6 @@ class PolytopeObserver:
         self.horizon = int(horizon)
         self.max_facets = max_facets
         self.eps = float(eps)
-        self._recursion: Recursion
         if as_published:
             _check_published(model, coupled, self.horizon)
             warnings.warn(UNSOUND, UserWarning, stacklevel=2)
@@ -110,11 +110,10 @@ class PolytopeObserver:
         Raises
         ------
         ValueError
-            If the set is empty, unbounded or of the wrong dimension.
+            If the set is empty, unbounded or of the wrong dimension, or outside the model's physical range.
         """
         _check_initial(set, self.model.n_states)
-        self._initial = set
-        self._last: tuple[Sample, Outcome] | None = None
+        self._forget(within_physical(self.model.physical_range, set))
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> PolytopeStep:
         """The first measurement, without a transition.
@@ -129,10 +128,10 @@ class PolytopeObserver:
             Scheduling value at this sample.
         """
         begun = perf_counter()
-        if self._last is not None:
+        if self._number >= 0:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
         sample = self._sample(0, y0, inputs_of(self.model, "u", u, self.model.uses_input_in_output), schedule)
-        return self._keep(sample, self._recursion.first(self._initial, sample), begun)
+        return self._answer(sample.u, sample, y0, begun)
 
     def step(
         self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
@@ -161,31 +160,21 @@ class PolytopeObserver:
         begun = perf_counter()
         inputs = inputs_of(self.model, "u", u, True)
         following = inputs_of(self.model, "u_next", u_next, self.model.uses_input_in_output)
-        if self._last is None:
-            sample = self._sample(1, y, following, schedule)
-            start = self._sample(0, np.full(self.model.n_outputs, np.nan), inputs, schedule)
-            last = self._recursion.first(self._initial, start)
-        else:
-            start, last = self._last
-            sample = self._sample(start.number + 1, y, following, schedule)
-        if last.verdict == "falsified":
-            return self._keep(sample, last, begun)
-        maps = transitions(start.stack, self.model, inputs)
-        return self._keep(sample, self._recursion.next(last, start, maps, sample), begun)
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
-        published = isinstance(self._recursion, PublishedRecursion)
-        limits = {"horizon": self.horizon, "max_facets": self.max_facets}
-        return {"kind": "polytope", **limits, "eps": self.eps, "as_published": published}
+        if self._number < 0:
+            self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
+        sample = self._sample(self._number + 1, y, following, schedule)
+        return self._answer(inputs, sample, y, begun)
 
     def state_dict(self) -> dict[str, NDArray]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
         facets = -1 if self.max_facets is None else self.max_facets
         published = isinstance(self._recursion, PublishedRecursion)
         state: dict[str, NDArray] = {"settings": np.array([self.horizon, facets, self.eps, published])}
+        largest = -1 if self.largest_at is None else self.largest_at
+        state["restart"] = np.array([self._number, largest, self._readings is not None])
         state |= write_set("initial", self._initial)
+        if self._readings is not None:
+            state |= {f"readings.{name}": value for name, value in self._readings.state().items()}
         if self._last is not None:
             sample, outcome = self._last
             state |= write_sample("sample", sample) | write_outcome("outcome", outcome)
@@ -209,6 +198,7 @@ class PolytopeObserver:
                 if sample.stack.shape != model.stack(model.schedule).shape:
                     raise ValueError(f"its stack has shape {sample.stack.shape}")
                 observer._last = sample, read_outcome(state, "outcome")
+            observer._restore(state)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"state does not belong to a polytope observer of this model: {error}") from error
         return observer
@@ -232,20 +222,11 @@ class PolytopeObserver:
         warm_up()
         return perf_counter() - begun
 
-    def _keep(self, sample: Sample, outcome: Outcome, begun: float) -> PolytopeStep:
-        self._last = sample, outcome
-        return PolytopeStep(
-            sample.number, outcome.verdict, outcome.certificate, perf_counter() - begun, outcome.joint,
-            self.model.n_states,
-        )  # fmt: skip
-
     def _sample(self, number: int, y: ArrayLike, u: Array, schedule: Any) -> Sample:
         outputs, stack = outputs_of(self.model, y), stack_at(self.model, schedule)
         lower, upper, noise = self.model.bounds(schedule)
-        disturbances = self.model.disturbance_polytope
-        if disturbances is None and lower.size:
-            disturbances = HPolytope.box(lower, upper)
-        return Sample(number, stack, disturbances, noise, u, outputs)
+        disturbances = self._disturbances(lower, upper)
+        return Sample(number, stack, disturbances, noise, u, readable(outputs), (lower, upper))
 
 
 def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None:

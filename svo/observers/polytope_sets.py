@@ -24,10 +24,11 @@ from svo.observers.vertex_images import hull_normals, hull_of_images, image, lim
 
 Array = NDArray[np.float64]
 Maps = Sequence[tuple[Array, Array]]
+_NO_DISTURBANCES = np.zeros(0), np.zeros(0)
 
 
 class Sample(NamedTuple):
-    """Model and data of one sample; ``disturbances`` is None where the model has none."""
+    """Model and data of one sample; ``disturbances`` is None where the model has none, ``w_box`` holds them."""
 
     number: int
     stack: Array
@@ -35,6 +36,7 @@ class Sample(NamedTuple):
     noise: Array
     u: Array
     y: Array
+    w_box: tuple[Array, Array] = _NO_DISTURBANCES
 
     def joint(self, states: HPolytope) -> HPolytope:
         """The set of (x, w) for x in a set."""

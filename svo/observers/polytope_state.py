@@ -31,13 +31,15 @@ def write_sample(name: str, sample: Sample) -> State:
     """The data of a sample."""
     state: State = {f"{name}.{part}": getattr(sample, part).copy() for part in ("stack", "noise", "u", "y")}
     state[f"{name}.number"] = np.array(sample.number)
+    state[f"{name}.w_box"] = np.array(sample.w_box)
     return state if sample.disturbances is None else state | write_set(f"{name}.w", sample.disturbances)
 
 
 def read_sample(state: Mapping[str, NDArray], name: str) -> Sample:
     disturbances = read_set(state, f"{name}.w") if f"{name}.w.A" in state else None
     stack, noise, u, y = (np.array(state[f"{name}.{part}"]) for part in ("stack", "noise", "u", "y"))
-    return Sample(int(state[f"{name}.number"]), stack, disturbances, noise, u, y)
+    w_lower, w_upper = np.array(state[f"{name}.w_box"])
+    return Sample(int(state[f"{name}.number"]), stack, disturbances, noise, u, y, (w_lower, w_upper))
 
 
 def write_outcome(name: str, outcome: Outcome) -> State:

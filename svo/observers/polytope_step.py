@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import Certificate, HPolytope
 from polytopes.exact import ZERO, rational
 from svo.observers.data import directions_of
+from svo.observers.readings import OUTGROWN
 from svo.observers.step import VerdictName
 from svo.observers.vertex_images import outer_support
 
@@ -130,6 +131,8 @@ class PolytopeStep:
         depends on w.
     n : int
         Number of states.
+    reason : str or None
+        Why the verdict is "undecided", where that is known; see `svo.observers.step.Step`.
     """
 
     sample: int
@@ -138,6 +141,7 @@ class PolytopeStep:
     seconds: float
     joint: HPolytope
     n: int
+    reason: str | None = None
 
     @property
     def set(self) -> HPolytope:
@@ -151,6 +155,8 @@ class PolytopeStep:
         """Bounds (lower, upper), each (n,), of the state at this sample; NaN once the model is falsified."""
         if self.verdict == "falsified":
             return np.full(self.n, np.nan), np.full(self.n, np.nan)
+        if self.reason == OUTGROWN:
+            return self.joint.bounding_box()
         axes = np.eye(self.n, self.joint.dim)
         ends = outer_support(self.joint, np.vstack([axes, -axes]))
         return -ends[self.n :], ends[: self.n]
@@ -170,6 +176,8 @@ class PolytopeStep:
         rows = directions_of(directions, self.n)
         if self.verdict == "falsified":
             return np.full(len(rows), -np.inf)
+        if self.reason == OUTGROWN:
+            return np.asarray(self.joint.support(rows), dtype=np.float64)
         return outer_support(self.joint, np.hstack([rows, np.zeros((len(rows), self.joint.dim - self.n))]))
 
 

@@ -21,6 +21,8 @@ from svo.observers.window_kernel import LARGEST
 Array = NDArray[np.float64]
 
 OUTGROWN = "outgrown"
+OUTSIDE = "outside the physical range"
+TOO_LARGE = "a reading is too large"
 _ROOM = 1.01  # times the half-width of a start: the set is the start of a window, whose readings shrink it at once
 _EXTRA = 10  # samples more than states, of which the readings are tried
 

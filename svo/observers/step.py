@@ -23,7 +23,8 @@ class Step(Protocol):
         "falsified" only with a certificate that has been checked in exact arithmetic.
     reason : str or None
         Why a verdict is "undecided", where it is known: "outgrown" (the set has grown beyond all bounds of use in a gap
-        of the measurements, and what came back does not yet bound the state), "outside the physical range".
+        of the measurements, and what came back does not yet bound the state), "outside the physical range" (of all that
+        the data allow, without a proof), "a reading is too large" (for a polytope, which then goes on without it).
     certificate : object with ``verify()``, or None
     seconds : float
         Wall time of the call.

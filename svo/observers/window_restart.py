@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from svo.observers import window_kernel as kernel
 from svo.observers.free_start import Reading
 from svo.observers.proof import ArrivalSet
-from svo.observers.readings import OUTGROWN, Readings
+from svo.observers.readings import OUTGROWN, OUTSIDE, Readings
 from svo.observers.step import VerdictName
 from svo.observers.window_programs import Outgrown, WindowPrograms, check_numbers
 
@@ -82,7 +82,7 @@ class RestartingWindow(WindowPrograms):
         w["new_lower"][:n], w["new_upper"][:n], meets = physical.cut(w["new_lower"][:n], w["new_upper"][:n])
         if meets:
             return verdict
-        self._reason = "outside the physical range"  # not proven, so no alarm
+        self._reason = OUTSIDE  # not proven, so no alarm
         return "undecided"
 
     # -- measurements that come late -----------------------------------------------------------------

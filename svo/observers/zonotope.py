@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from time import perf_counter
 from typing import Any
 
@@ -15,8 +15,11 @@ from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
+from svo.observers.free_start import Reading
 from svo.observers.proof import WindowSample
+from svo.observers.readings import OUTGROWN, Readings
 from svo.observers.step import VerdictName
+from svo.observers.window_kernel import LARGEST
 from svo.observers.window_setup import needs_next_input
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate
@@ -69,6 +72,12 @@ class ConstrainedZonotopeObserver:
             raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
+        self._configure(model, max_generators, max_constraints, eps)
+        self.reset(initial)
+
+    def _configure(
+        self, model: UncertainModel, max_generators: int | None, max_constraints: int | None, eps: float
+    ) -> None:
         n = model.n_states
         self.model = model
         self.eps = float(eps)
@@ -76,7 +85,6 @@ class ConstrainedZonotopeObserver:
         self.max_constraints = _limit("max_constraints", max_constraints, 3 * n, 0)
         self._builder = StageBuilder(model, self.eps)
         self._wants_next_input = needs_next_input(model)
-        self.reset(initial)
 
     # -- the protocol ----------------------------------------------------------------------------
 
@@ -86,12 +94,27 @@ class ConstrainedZonotopeObserver:
         Raises
         ------
         ValueError
-            If the set is empty, unbounded or of the wrong dimension.
+            If the set is empty, unbounded or of the wrong dimension, or outside the model's physical range.
         """
         self._first = self._builder.first_set(set)
         self._number = -1
         self._stages: tuple[Stage, ...] = ()  # the last one goes on to the next sample
         self._falsified: ZonotopeCertificate | None = None
+        self._readings: Readings | None = None  # of an observer that has lost its set
+        self.largest_at: int | None = None
+
+    def lose_set(self) -> None:
+        """Forget all data; nothing is known of the state at the next measurement.
+
+        The observer starts from the model's largest set, or is undecided until the readings alone bound the state.
+        """
+        self._number, self._stages, self._falsified = -1, (), None
+        self._readings, self.largest_at = None, None
+        largest = self.model.start_range
+        if largest is None:
+            self._readings = Readings(self.model, self.eps)
+        else:
+            self._first, self.largest_at = ConstrainedZonotope.box(largest.lower, largest.upper), 0
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> ZonotopeStep:
         """The first measurement, without a transition.
@@ -106,11 +129,13 @@ class ConstrainedZonotopeObserver:
             Scheduling value at this sample.
         """
         begun = perf_counter()
-        if self._stages or self._falsified is not None:
+        if self._number >= 0:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
         inputs = inputs_of(self.model, "u", u, self._wants_next_input)
         data = self._data(inputs, outputs_of(self.model, y0), schedule)
-        return self._conclude((), self._builder.measured(self._first, data), None, begun)
+        if self._readings is not None:
+            return self._without_set(inputs, data, begun)
+        return self._begin(data, begun)
 
     def step(
         self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
@@ -133,8 +158,6 @@ class ConstrainedZonotopeObserver:
         ValueError
             For a wrong shape, an infinite or missing value, or a schedule that gives no finite matrices. The
             observer is unchanged.
-        OverflowError
-            If the set has grown beyond what floats can hold. The observer is unchanged.
         """
         begun = perf_counter()
         inputs = inputs_of(self.model, "u", u, True)
@@ -143,12 +166,11 @@ class ConstrainedZonotopeObserver:
         if self._falsified is not None:
             return self._answer("falsified", self._stages[-1], begun)
         data = self._data(following, outputs, schedule)
-        if not self._stages:
+        if self._number < 0:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
-        before, states = self._builder.predicted(self._stages[-1], inputs)
-        if not states.is_finite():
-            raise OverflowError("the set of the next state has no finite bounds: too long without a measurement")
-        return self._conclude((before,), self._builder.measured(states, data), states, begun)
+        if self._readings is not None:
+            return self._without_set(inputs, data, begun)
+        return self._go_on(inputs, data, begun) or self._give_up(inputs, data, begun)
 
     def run(self, log: Log) -> ZonotopeRecord:
         """All samples of a log, with the box of the state at each."""
@@ -167,7 +189,7 @@ class ConstrainedZonotopeObserver:
         begun = perf_counter()
         other = ConstrainedZonotopeObserver.__new__(ConstrainedZonotopeObserver)
         other.__dict__.update(self.__dict__)
-        other._stages, other._falsified = (), None
+        other._number, other._stages, other._falsified, other._readings = -1, (), None, None
         y, u = np.full(self.model.n_outputs, np.nan), np.zeros(self.model.n_inputs)
         other.update(y, u, self.model.schedule)
         other.step(u, y, u, self.model.schedule).box  # noqa: B018
@@ -183,7 +205,11 @@ class ConstrainedZonotopeObserver:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
         falsified = float(self._falsified is not None)
         settings = [self._number, falsified, self.max_generators, self.max_constraints, self.eps]
-        state = {"settings": np.array(settings)} | _named("first", self._first)
+        largest = -1 if self.largest_at is None else self.largest_at
+        state = {"settings": np.array(settings), "restart": np.array([largest, self._readings is not None])}
+        state |= _named("first", self._first)
+        if self._readings is not None:
+            state |= {f"readings.{name}": value for name, value in self._readings.state().items()}
         for i, stage in enumerate(self._stages):
             state |= _named(f"{i}.arrival", stage.arrival)
             state |= {f"{i}.{name}": getattr(stage.data, name).copy() for name in _SAMPLE}
@@ -200,13 +226,68 @@ class ConstrainedZonotopeObserver:
         """
         try:
             number, falsified, generators, constraints, eps = (float(v) for v in state["settings"])
-            n = model.n_states
-            observer = cls(model, HPolytope.box(np.zeros(n), np.zeros(n)), int(generators), int(constraints), eps)
+            observer = cls.__new__(cls)
+            observer._configure(model, int(generators), int(constraints), eps)
             observer._first = _read(state, "first")
             observer._restore(int(number), bool(falsified), state)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"state does not belong to a zonotope observer of this model: {error}") from error
         return observer
+
+    # -- a set that is lost ------------------------------------------------------------------------
+
+    def _begin(self, data: WindowSample, begun: float) -> ZonotopeStep:
+        """The first sample of a set."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            now = self._builder.measured(self._first, data)
+        return self._conclude((), now, None, begun) if now.joint.within(LARGEST) else self._lost(data.u, data, begun)
+
+    def _go_on(self, u: Array, data: WindowSample, begun: float) -> ZonotopeStep | None:
+        """The next sample, or None if the set has outgrown all bounds."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            before, states = self._builder.predicted(self._stages[-1], u)
+            if not states.within(LARGEST):
+                return None
+            now = self._builder.measured(states, data)
+        return self._conclude((before,), now, states, begun) if now.joint.within(np.inf) else None
+
+    def _give_up(self, u: Array, data: WindowSample, begun: float) -> ZonotopeStep:
+        """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
+        largest = self.model.start_range
+        if largest is None:
+            return self._lost(u, data, begun)
+        self._first, self.largest_at = ConstrainedZonotope.box(largest.lower, largest.upper), self._number + 1
+        return self._begin(data, begun)
+
+    def _lost(self, u: Array, data: WindowSample, begun: float) -> ZonotopeStep:
+        self._stages, self.largest_at, self._readings = (), None, Readings(self.model, self.eps)
+        return self._without_set(u, data, begun)
+
+    def _without_set(self, u: Array, data: WindowSample, begun: float) -> ZonotopeStep:
+        """A sample of an observer that has no set: it starts again once the readings alone bound the state."""
+        assert self._readings is not None
+        self._number += 1
+        self._readings.add(u, Reading(data.stack, data.u, data.y, data.noise, data.slack, data.w_lower, data.w_upper))
+        found = self._readings.start()
+        return (found and self._start_again(*found, begun)) or self._answer("undecided", None, begun)
+
+    def _start_again(self, samples: list[Reading], lower: Array, upper: Array, begun: float) -> ZonotopeStep | None:
+        """From bounds of the state at the first of some samples; None if a set does not come out of it."""
+        number, readings = self._number, self._readings
+        physical = self.model.physical_range
+        if physical is not None:
+            lower, upper, _ = physical.cut(lower, upper)
+        self._number, self._readings = number - len(samples), None
+        self._first = ConstrainedZonotope.box(lower, upper)
+        step = None
+        for j, s in enumerate(samples):
+            data = self._builder.data(s.stack, (s.w_lower, s.w_upper, s.noise), s.u, s.y)
+            step = self._begin(data, begun) if j == 0 else self._go_on(samples[j - 1].u, data, begun)
+            if step is None or step.reason is not None or (step.verdict == "falsified" and j + 1 < len(samples)):
+                # a proof before the last sample would rest on readings that come after it
+                self._number, self._readings, self._stages, self._falsified = number, readings, (), None
+                return None
+        return step
 
     # -- inside ------------------------------------------------------------------------------------
 
@@ -225,6 +306,8 @@ class ConstrainedZonotopeObserver:
             self._stages = (now,)
         else:
             arrival = reduced(states, self.max_generators, self.max_constraints)
+            if self.model.physical_range is not None:
+                arrival = arrival.cut_to(self.model.physical_range.lower, self.model.physical_range.upper)
             self._stages = (self._builder.measured(arrival, now.data),)
         return self._answer(verdict, now, begun)
 
@@ -235,15 +318,18 @@ class ConstrainedZonotopeObserver:
             return "consistent"
         if answer.status == "empty":
             for multipliers in (answer.ray, -answer.ray):
-                self._falsified = self._builder.certificate((*before, now), multipliers, self._number)
-                if self._falsified is not None:
+                found = self._builder.certificate((*before, now), multipliers, self._number)
+                if found is not None:
+                    window = replace(found.window, largest_at=self.largest_at)
+                    self._falsified = replace(found, window=window)
                     return "falsified"
         return "undecided"
 
-    def _answer(self, verdict: VerdictName, now: Stage, begun: float) -> ZonotopeStep:
+    def _answer(self, verdict: VerdictName, now: Stage | None, begun: float) -> ZonotopeStep:
         return ZonotopeStep(
-            self._number, verdict, self._falsified, perf_counter() - begun, now.joint, self.model.n_states
-        )
+            self._number, verdict, self._falsified, perf_counter() - begun, None if now is None else now.joint,
+            self.model.n_states, None if now is not None else OUTGROWN, self.model.physical_range,
+        )  # fmt: skip
 
     def _restore(self, number: int, falsified: bool, state: Mapping[str, Array]) -> None:
         """The stages, made again from their arrival sets and data as they were made first."""
@@ -258,7 +344,13 @@ class ConstrainedZonotopeObserver:
                 before, arrival = self._builder.predicted(stages[-1], stages[-1].data.u)
                 stages[-1] = before
             stages.append(self._builder.measured(arrival, data))
-        self._stages, self._number = tuple(stages), number
+        largest, lost = (int(v) for v in state["restart"])
+        self._stages, self._number, self._falsified = tuple(stages), number, None
+        self.largest_at, self._readings = None if largest < 0 else largest, None
+        if lost:
+            self._readings = Readings(self.model, self.eps)
+            prefix = "readings."
+            self._readings.restore({k.removeprefix(prefix): state[k] for k in state if k.startswith(prefix)})
         if falsified and self._decide(self._stages[:-1], self._stages[-1]) != "falsified":
             raise ValueError("its falsification cannot be proven again")
 

@@ -16,7 +16,7 @@ from svo.model import UncertainModel
 from svo.observers.constrained_zonotope import EPS, ConstrainedZonotope, unit
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
 from svo.observers.window_kernel import channel_factors
-from svo.observers.window_setup import channel_owners, finite_box, joint_rows, output_is_disturbed
+from svo.observers.window_setup import channel_owners, finite_box, joint_rows, output_is_disturbed, within
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate, proven_support, rounded_up
 
@@ -80,7 +80,8 @@ class StageBuilder:
 
     def first_set(self, initial: HPolytope) -> ConstrainedZonotope:
         """The set of first states; ValueError if it is empty, unbounded or of the wrong dimension."""
-        return ConstrainedZonotope.box(*finite_box(initial, self.model.n_states)).cut(*joint_rows(initial))
+        lower, upper = within(self.model.physical_range, *finite_box(initial, self.model.n_states))
+        return ConstrainedZonotope.box(lower, upper).cut(*joint_rows(initial))
 
     def data(self, stack: Array, bounds: tuple[Array, Array, Array], u: Array, y: Array) -> WindowSample:
         """What is known of a sample before the set is."""

@@ -13,6 +13,7 @@ from svo.observers.data import directions_of
 from svo.observers.step import VerdictName
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate
+from svo.state_range import StateRange
 
 Array = NDArray[np.float64]
 
@@ -27,18 +28,24 @@ class ZonotopeStep:
     verdict : {"consistent", "falsified", "undecided"}
     certificate : ZonotopeCertificate or None
     seconds : float
-    joint : ConstrainedZonotope
-        Contains the state at this sample and, behind it, w and the channels where the output depends on them.
+    joint : ConstrainedZonotope or None
+        Contains the state at this sample and, behind it, w and the channels where the output depends on them. None
+        while the set is outgrown.
     n : int
         Number of states.
+    reason : str or None
+    physical : StateRange or None
+        The range that the model promises; box, set and support are cut to it.
     """
 
     sample: int
     verdict: VerdictName
     certificate: ZonotopeCertificate | None
     seconds: float
-    joint: ConstrainedZonotope
+    joint: ConstrainedZonotope | None
     n: int
+    reason: str | None = None
+    physical: StateRange | None = None
     _bounds: list[tuple[Array, Array]] = field(default_factory=list, repr=False)
 
     @property
@@ -48,8 +55,11 @@ class ZonotopeStep:
             return np.full(self.n, np.nan), np.full(self.n, np.nan)
         if not self._bounds:
             axes = np.eye(self.n)
-            ends = self.support(np.vstack([axes, -axes]))
-            self._bounds.append((-ends[self.n :], ends[: self.n]))
+            ends = self._support(np.vstack([axes, -axes]))
+            lower, upper = -ends[self.n :], ends[: self.n]
+            if self.physical is not None:
+                lower, upper, _ = self.physical.cut(lower, upper)
+            self._bounds.append((lower, upper))
         lower, upper = self._bounds[0]
         return lower.copy(), upper.copy()
 
@@ -58,7 +68,10 @@ class ZonotopeStep:
         """The box of the state as a polytope; empty once the model is falsified. See `joint` for the whole set."""
         if self.verdict == "falsified":
             return HPolytope.empty(self.n)
-        return HPolytope.box(*self.box)
+        lower, upper = self.box
+        bounds = np.concatenate([upper, -lower])
+        known = np.isfinite(bounds)
+        return HPolytope(np.vstack([np.eye(self.n), -np.eye(self.n)])[known], bounds[known])
 
     def support(self, directions: ArrayLike) -> Array:
         """Outer bounds of d'x over the states at this sample, in any directions.
@@ -75,6 +88,12 @@ class ZonotopeStep:
         rows = directions_of(directions, self.n)
         if self.verdict == "falsified":
             return np.full(len(rows), -np.inf)
+        values = self._support(rows)
+        return values if self.physical is None else np.minimum(values, self.physical.support(rows))
+
+    def _support(self, rows: Array) -> Array:
+        if self.joint is None:
+            return np.full(len(rows), np.inf)
         wide = np.hstack([rows, np.zeros((len(rows), self.joint.dim - self.n))])
         return ZonotopeProgram(self.joint).support(wide)
 
