@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.isolation.bank import Bank, Sample, falsified_and_undecided
+from svo.isolation.bank import Bank, Sample, falsified_and_undecided, largest_at
 from svo.isolation.bank_checks import by_name, check_counts
 from svo.isolation.bank_state import set_arrays, set_of
 from svo.isolation.global_logic import GlobalLogic
@@ -49,6 +49,8 @@ class ArchitectureI(Bank):
     measurement that nothing explains. These sets contain the true state if one of the survivors' models
     holds (in the second case: held until the sample before); that is the assumption behind debounce,
     recovery and timeout. Without any of the three, nothing ever starts again and no such assumption is made.
+    Where there is no such set, or it is unbounded since a survivor's was lost in a gap, an observer starts as one that
+    has lost its own: from its model's largest set, or when the readings alone bound the state.
 
     Raises
     ------
@@ -73,13 +75,15 @@ class ArchitectureI(Bank):
     def _forget(self) -> None:
         super()._forget()
         self._hull: Box | None = None
+        self._largest_at: int | None = None  # what the hull rests on
 
     def _memory(self) -> dict[str, Array]:
-        return {} if self._hull is None else {"hull": np.array(self._hull)}
+        return ({} if self._hull is None else {"hull": np.array(self._hull)}) | _sample_array(self._largest_at)
 
     def _recall(self, arrays: Mapping[str, Array]) -> None:
         hull = arrays.get("hull")
         self._hull = None if hull is None else (hull[0], hull[1])
+        self._largest_at = _sample_of(arrays)
 
     def _begin_again(
         self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
@@ -87,16 +91,20 @@ class ArchitectureI(Bank):
         """Initialise the observers that the logic asks for, and keep the hull of this sample's boxes."""
         if not self._logic.may_restart:
             return state
-        survivors = [step.box for name, step in steps.items() if name not in falsified]
+        survivors = [name for name in steps if name not in falsified]
         if survivors:
-            self._hull = _hull(survivors)
+            self._hull = _hull([steps[name].box for name in survivors])
+            self._largest_at = _at_sample(k, largest_at(self.observers, steps, survivors))
             for name in state.restart:
-                self._start_from(name, HPolytope.box(*self._hull), now)
+                self._start_from(name, _box(self._hull), now, largest_at=_age(k, self._largest_at))
         elif self._hull is None:
-            return self._logic.give_up(state, k)
+            if not all(_has_largest_set(self.observers[name]) for name in state.restart):
+                return self._logic.give_up(state, k)
+            for name in state.restart:
+                self._start_from(name, None, now)
         elif state.restart:
-            before = HPolytope.box(*self._hull)
-            self._hull = _hull([self._predict_from(name, before, now).box for name in state.restart])
+            before, since = _box(self._hull), _age(k, self._largest_at)
+            self._hull = _hull([self._predict_from(name, before, now, since).box for name in state.restart])
         return state
 
 
@@ -176,12 +184,14 @@ class ArchitectureII(Bank):
     def _forget(self) -> None:
         super()._forget()
         self._global_set = self._constant
+        self._largest_at: int | None = None  # what the global set rests on
 
     def _memory(self) -> dict[str, Array]:
-        return set_arrays("global", self._global_set)
+        return set_arrays("global", self._global_set) | _sample_array(self._largest_at)
 
     def _recall(self, arrays: Mapping[str, Array]) -> None:
         self._global_set = set_of("global", arrays)
+        self._largest_at = _sample_of(arrays)
 
     def _begin_again(
         self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
@@ -189,23 +199,25 @@ class ArchitectureII(Bank):
         """Start the observers that the logic asks for from the global set of this sample."""
         if GLOBAL in falsified and self._global_set is None:
             return self._logic.give_up(state, k)
-        self._keep_global_set(state, steps, now)
+        self._keep_global_set(state, k, steps, now)
         while state.restart:
-            fallen = self._start(state, steps, now)
+            fallen = self._start(state, k, steps, now)
             if not fallen:
                 break
             # The others have no new answer at this sample.
             state = self._logic.advance(state, k, fallen, undecided=(*self.names, GLOBAL))
         return state
 
-    def _keep_global_set(self, state: LogicState, steps: dict[str, Step], now: Sample) -> None:
+    def _keep_global_set(self, state: LogicState, k: int, steps: dict[str, Step], now: Sample) -> None:
         if GLOBAL in state.restart:
             assert self._global_set is not None
-            self._global_set = self._predict_from(GLOBAL, self._global_set, now).set
+            since = _age(k, self._largest_at)
+            self._global_set = self._predict_from(GLOBAL, _bounded(self._global_set), now, since).set
         elif GLOBAL in steps and (state.restart or self._logic.may_restart):
             self._global_set = steps[GLOBAL].set
+            self._largest_at = _at_sample(k, largest_at(self.observers, steps, [GLOBAL]))
 
-    def _start(self, state: LogicState, steps: dict[str, Step], now: Sample) -> list[str]:
+    def _start(self, state: LogicState, k: int, steps: dict[str, Step], now: Sample) -> list[str]:
         """Start observers, keep the answers of those that did not fall, and say which fell at once."""
         assert self._global_set is not None
         started: dict[str, Step] = {}
@@ -214,7 +226,8 @@ class ArchitectureII(Bank):
                 continue
             # The measurement that falsified an observer is left out: it may be an outlier.
             measures = name not in steps and state.state in ("detected", "isolated")
-            step = self._start_from(name, self._global_set, now, now.y if measures else None)
+            since = _age(k, self._largest_at)
+            step = self._start_from(name, _bounded(self._global_set), now, now.y if measures else None, since)
             if name not in steps or steps[name].verdict != "falsified":
                 started[name] = step
         steps |= started
@@ -223,6 +236,38 @@ class ArchitectureII(Bank):
 
 def _hull(boxes: list[Box]) -> Box:
     return np.min([lower for lower, _ in boxes], axis=0), np.max([upper for _, upper in boxes], axis=0)
+
+
+def _box(hull: Box) -> HPolytope | None:
+    """None where a set is lost, so that nothing bounds the state."""
+    return HPolytope.box(*hull) if np.isfinite(hull).all() else None
+
+
+def _bounded(set: HPolytope) -> HPolytope | None:
+    """None where a set is lost."""
+    return set if np.isfinite(set.bounding_box()).all() else None
+
+
+def _has_largest_set(observer: Observer) -> bool:
+    return getattr(observer.model, "start_range", None) is not None and hasattr(observer, "lose_set")
+
+
+def _at_sample(k: int, age: int | None) -> int | None:
+    """The bank's number of a sample that is counted from sample k."""
+    return None if age is None else k + age
+
+
+def _age(k: int, sample: int | None) -> int | None:
+    """The other way."""
+    return None if sample is None else sample - k
+
+
+def _sample_array(sample: int | None) -> dict[str, Array]:
+    return {} if sample is None else {"largest_at": np.array(float(sample))}
+
+
+def _sample_of(arrays: Mapping[str, Array]) -> int | None:
+    return int(arrays["largest_at"]) if "largest_at" in arrays else None
 
 
 def _check_class_one(class_one: Collection[str], faults: Mapping[str, Observer]) -> None:

@@ -338,20 +338,37 @@ class Bank(ABC):
         self._sample, self._latest = k, now
         return Verdict(k, state.state, state.fault, state.alive, state.detected_at, state.isolated_at, steps)
 
-    def _start_from(self, name: str, set: HPolytope, at: Sample, y: ArrayLike | None = None) -> Step:
-        """Start an observer from a set of states at a sample; without y it only learns of inputs and schedule."""
-        observer = self.observers[name]
-        observer.reset(set)
-        return observer.update(self._nothing() if y is None else y, u=at.u_next, schedule=at.schedule)
+    def _start_from(
+        self, name: str, set: HPolytope | None, at: Sample, y: ArrayLike | None = None, largest_at: int | None = None
+    ) -> Step:
+        """Start an observer from a set of states at a sample; without y it only learns of inputs and schedule.
 
-    def _predict_from(self, name: str, set: HPolytope, now: Sample) -> Step:
+        None is a set that is lost. ``largest_at`` is that of what the set rests on, counted from the sample.
+        """
+        observer: Any = self.observers[name]
+        physical = getattr(observer.model, "physical_range", None)
+        if set is not None and physical is not None and not physical.cut(*set.bounding_box())[2]:
+            set = None  # no state of it is one of the plant, as nothing has proven yet
+        if set is not None:
+            observer.reset(set)
+            if largest_at is not None:
+                observer.largest_at = largest_at
+        elif hasattr(observer, "lose_set"):
+            observer.lose_set()
+        else:
+            kind = type(observer).__name__
+            raise TypeError(f"observer {name!r} ({kind}) has no lose_set, and there is no bounded set to start it from")
+        return self.observers[name].update(self._nothing() if y is None else y, u=at.u_next, schedule=at.schedule)
+
+    def _predict_from(self, name: str, set: HPolytope | None, now: Sample, largest_at: int | None) -> Step:
         """Start from the set of the sample before, leaving out the measurement that nothing explains.
 
-        One that came late leaves the set of its verdict, which is of the present sample.
+        One that came late leaves the set of its verdict, which is of the present sample. ``largest_at`` is counted from
+        the present sample.
         """
         if now is self._latest:
-            return self._start_from(name, set, now)
-        self._start_from(name, set, self._latest)
+            return self._start_from(name, set, now, largest_at=largest_at)
+        self._start_from(name, set, self._latest, largest_at=None if largest_at is None else largest_at + 1)
         return self.observers[name].step(now.u, self._nothing(), u_next=now.u_next, schedule=now.schedule)
 
     def _nothing(self) -> ArrayLike:
@@ -367,6 +384,13 @@ class Bank(ABC):
             shape = getattr(log, name).shape
             if shape[1] != wanted:
                 raise ValueError(f"log.{name} has shape {shape}; expected (samples, {wanted}), as the models have")
+
+
+def largest_at(observers: Mapping[str, Observer], steps: Mapping[str, Step], names: Collection[str]) -> int | None:
+    """Newest sample, counted from the present one, at which a set that one of these rests on was the largest set."""
+    own = [(steps[name], getattr(observers[name], "largest_at", None)) for name in names]
+    ages = [at - getattr(step, "sample", 0) for step, at in own if at is not None]
+    return max(ages, default=None)
 
 
 def falsified_and_undecided(steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:

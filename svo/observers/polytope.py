@@ -19,6 +19,7 @@ from svo.observers.polytope_restart import RestartingPolytope
 from svo.observers.polytope_sets import PublishedRecursion, Sample, SoundRecursion
 from svo.observers.polytope_state import read_outcome, read_sample, read_set, write_outcome, write_sample, write_set
 from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
+from svo.observers.readings import NO_SAMPLE
 from svo.observers.window_setup import check_first_states, may_be_nonzero
 
 Array = NDArray[np.float64]
@@ -170,7 +171,7 @@ class PolytopeObserver(RestartingPolytope):
         facets = -1 if self.max_facets is None else self.max_facets
         published = isinstance(self._recursion, PublishedRecursion)
         state: dict[str, NDArray] = {"settings": np.array([self.horizon, facets, self.eps, published])}
-        largest = -1 if self.largest_at is None else self.largest_at
+        largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state["restart"] = np.array([self._number, largest, self._readings is not None])
         state |= write_set("initial", self._initial)
         if self._readings is not None:

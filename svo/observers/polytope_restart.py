@@ -15,7 +15,7 @@ from svo.observers.free_start import Reading
 from svo.observers.polytope_limits import FLOATS_TELL_APART, anywhere, cut_to, is_of_use, reach_ahead
 from svo.observers.polytope_sets import Outcome, Recursion, Sample
 from svo.observers.polytope_step import PolytopeCertificate, PolytopeStep
-from svo.observers.readings import OUTGROWN, OUTSIDE, TOO_LARGE, Readings
+from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, TOO_LARGE, Readings
 from svo.observers.vertex_images import transitions
 from svo.observers.window_kernel import LARGEST
 
@@ -161,7 +161,7 @@ class RestartingPolytope:
     def _restore(self, state: Mapping[str, NDArray]) -> None:
         """What a saved state says of the set's start."""
         number, largest, lost = (int(v) for v in state["restart"])
-        self._number, self.largest_at = number, None if largest < 0 else largest
+        self._number, self.largest_at = number, None if largest == NO_SAMPLE else largest
         if lost:
             self._readings = Readings(self.model, self.eps, self.horizon)
             prefix = "readings."

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 OUTGROWN = "outgrown"
 OUTSIDE = "outside the physical range"
 TOO_LARGE = "a reading is too large"
+NO_SAMPLE = -(2**62)  # stands for none in saved states; numbers may be negative after a bank's restart
 _ROOM = 1.01  # times the half-width of a start: the set is the start of a window, whose readings shrink it at once
 _EXTRA = 10  # samples more than states, of which the readings are tried
 

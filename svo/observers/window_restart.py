@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from svo.observers import window_kernel as kernel
 from svo.observers.free_start import Reading
 from svo.observers.proof import ArrivalSet
-from svo.observers.readings import OUTGROWN, OUTSIDE, Readings
+from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, Readings
 from svo.observers.step import VerdictName
 from svo.observers.window_programs import Outgrown, WindowPrograms, check_numbers
 
@@ -263,7 +263,7 @@ class RestartingWindow(WindowPrograms):
 
     def _restart_state(self) -> dict[str, Array]:
         """What the next samples depend on besides the kernel's memory."""
-        largest = -1 if self.largest_at is None else self.largest_at
+        largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         lost_at = self._lost_at if self._lost else -1
         numbers = [self._origin, self._free, self._lost, lost_at, largest, self._readings is not None]
         state: dict[str, Any] = {"restart": np.array(numbers, dtype=np.int64), "missing": self._missing}
@@ -278,7 +278,7 @@ class RestartingWindow(WindowPrograms):
         anchor = ArrivalSet(**{f.name: np.array(state[f"anchor.{f.name}"]) for f in fields(ArrivalSet)})
         self._begin(anchor, steps, origin, bool(free))
         self._lost, self._lost_at = bool(lost), lost_at
-        self.largest_at = None if largest < 0 else largest
+        self.largest_at = None if largest == NO_SAMPLE else largest
         self._missing = np.array(state["missing"], dtype=np.int64)
         if has_readings:
             self._readings = Readings(self.model, self.eps, self.horizon or 0)

@@ -17,7 +17,7 @@ from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.free_start import Reading
 from svo.observers.proof import WindowSample
-from svo.observers.readings import OUTGROWN, Readings
+from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
 from svo.observers.step import VerdictName
 from svo.observers.window_kernel import LARGEST
 from svo.observers.window_setup import needs_next_input
@@ -205,7 +205,7 @@ class ConstrainedZonotopeObserver:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
         falsified = float(self._falsified is not None)
         settings = [self._number, falsified, self.max_generators, self.max_constraints, self.eps]
-        largest = -1 if self.largest_at is None else self.largest_at
+        largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state = {"settings": np.array(settings), "restart": np.array([largest, self._readings is not None])}
         state |= _named("first", self._first)
         if self._readings is not None:
@@ -346,7 +346,7 @@ class ConstrainedZonotopeObserver:
             stages.append(self._builder.measured(arrival, data))
         largest, lost = (int(v) for v in state["restart"])
         self._stages, self._number, self._falsified = tuple(stages), number, None
-        self.largest_at, self._readings = None if largest < 0 else largest, None
+        self.largest_at, self._readings = None if largest == NO_SAMPLE else largest, None
         if lost:
             self._readings = Readings(self.model, self.eps)
             prefix = "readings."

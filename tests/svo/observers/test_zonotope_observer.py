@@ -10,7 +10,6 @@ from flint import fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.soundness import examine
 from polytopes import HPolytope
 from polytopes.exact import rational, rational_vector
 from svo import ConstrainedZonotopeObserver, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
