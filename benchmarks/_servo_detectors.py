@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from benchmarks._servo_records import Ts
 from polytopes import HPolytope
 from svo.interval import (
+    GainBounds,
     IntervalDetector,
     IntervalPredictor,
     NoiseCharacterization,
@@ -56,8 +57,15 @@ class Outcome:
 def learn(records: Log) -> tuple[FirstOrderFit, NoiseCharacterization]:
     """Bounds of g and h, and the noise left by them, from one healthy log."""
     fit = identify_first_order(records)
+    fit = replace(fit, gains=gains_of_parts(fit))
     residual = predictor(fit, records).predict(records).residual
     return fit, NoiseCharacterization.from_records(residual, QBAR, SAFETY)
+
+
+def gains_of_parts(fit: FirstOrderFit) -> GainBounds:
+    """Bounds that reach the fits of the parts and no further: what happens from sample to sample is learnt as noise."""
+    radii = np.abs(fit.parts - [fit.gains.gc, fit.gains.hc]).max(axis=0, initial=0.0)
+    return GainBounds(fit.gains.gc, float(radii[0]), fit.gains.hc, float(radii[1]))
 
 
 def predictor(fit: FirstOrderFit, log: Log) -> IntervalPredictor:

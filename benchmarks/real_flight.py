@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks._servo_detectors import gains_of_parts
 from benchmarks._servo_records import VARIABLE, data_folder
 from svo.interval import GainBounds, IntervalDetector, IntervalPredictor, NoiseCharacterization
 from svo.interval.identification import identify_first_order
@@ -62,7 +63,7 @@ def main() -> None:
 
 def _row(name: str, log: Log, failed: float) -> list[str]:
     learning, healthy, after = between(log, *LEARN), between(log, LEARN[1], failed), between(log, LEARN[1], np.inf)
-    gains = identify_first_order(learning, parts=2).gains
+    gains = gains_of_parts(identify_first_order(learning, parts=2))
     noise = NoiseCharacterization.from_records(_predictor(gains, learning).predict(learning).residual, QBAR, SAFETY)
     found = IntervalDetector(_predictor(gains, after), noise, POLE).run(after)
     calm = found.exceeded[: len(healthy)]

@@ -14,6 +14,13 @@ from svo.log import Log
 Array = NDArray[np.float64]
 
 
+_SHORTEST = 0.01  # of a record, in time constants of the fit: nothing tells a longer one from no decay at all
+_BLOCKS = 8  # pieces over which the scores of the fit are summed for its standard errors
+_STANDARD_ERRORS = 6.0  # beyond 99.9 % of a t distribution of 7 degrees
+_FAR = 20.0  # as often as the noise is a sample away from its target that tells the pole to 1 / 20
+_LEAST = 50  # samples, the farthest, if fewer are that far
+
+
 @dataclass(frozen=True, eq=False)
 class FirstOrderFit:
     """A pole g and a static gain h with bounds, x+ = g x + (1 - g) h u.
@@ -21,20 +28,25 @@ class FirstOrderFit:
     Attributes
     ----------
     gains : GainBounds
-        Centres: the fit to all records. Radii: the largest distance from them of a fit to one part.
+        Centres: the fit to all records. Radii: see `identify_first_order`.
     parts : (n_parts, 2) array
         (g, h) of each part that moved.
+    still : int
+        Number of parts that did not move, or had less than three measurements: they say nothing, and are left out.
     largest_error : float
         Largest difference of y from the simulated y of the centre model, over all records.
     """
 
     gains: GainBounds
     parts: Array
+    still: int
     largest_error: float
 
 
-def identify_first_order(records: Log | Sequence[Log], parts: int = 4) -> FirstOrderFit:
-    """Least squares of the simulation error, over all records and over each of their parts.
+def identify_first_order(
+    records: Log | Sequence[Log], parts: int = 4, *, safety_factor: float = 1.2
+) -> FirstOrderFit:
+    """Least squares of the simulation error, with radii that contain what g and h did in the records.
 
     The predictor simulates, so the fit minimises ``|y - x|`` for x simulated from each record's first measurement by
     inputs alone, not the error of one step ahead.
@@ -44,45 +56,96 @@ def identify_first_order(records: Log | Sequence[Log], parts: int = 4) -> FirstO
     records : Log or sequence of Log
         Fault-free, one input and one output each; missing measurements are left out.
     parts : int
-        Pieces of equal length into which each record is cut for the radii. One piece gives radii of zero if there is
-        one record.
+        Pieces of equal length into which each record is cut, to see g and h change slowly.
+    safety_factor : float
+        >= 1, of the radius of g: room for what the records did not show.
 
     Raises
     ------
     ValueError
-        For records with other channels, too short or without motion, or a fit with ``|g| >= 1``.
+        For records with other channels, too short or without motion, or a fit with ``|g| >= 1``, or so near
+        to it that a hundred records would not show the decay.
+
+    Notes
+    -----
+    Each radius is the distance to the farthest fit of a part, and six standard errors of the fit (robust to
+    correlated errors) besides. That of g is at least the safety factor times the largest deviation of a single step's
+    pole (y(k+1) - h u) / (y(k) - h u), over the fifty samples at which y is farthest from h u, and all others at which
+    it is twenty times as far as what samples at rest leave unexplained. It contains every change of g from sample to
+    sample there, and a share of the noise besides: bounds that hold are wide where noise is large against the motion,
+    and |gc| + gr may then reach 1, which `IntervalPredictor` refuses. That of h has the distance to the fit of one
+    step ahead added, which errs otherwise; a gain that changes from sample to sample counts as a change of g. As all
+    that is learnt from records the bounds say what was seen, and no record proves the future.
     """
     every = [records] if isinstance(records, Log) else list(records)
     if not every:
         raise ValueError("records is empty; expected at least one fault-free log")
     if parts < 1:
         raise ValueError(f"parts is {parts}; expected a number of pieces >= 1")
+    if not (np.isfinite(safety_factor) and safety_factor >= 1):
+        raise ValueError(f"safety_factor is {safety_factor}; expected a number >= 1, such as 1.2")
     whole = [_channels(log) for log in every]
-    pieces = [piece for u, y in whole for piece in zip(np.array_split(u, parts), np.array_split(y, parts), strict=True)]
-    centre = _fit(whole)
-    fits = np.array([_fit([piece]) for piece in pieces if _moves(*piece)]).reshape(-1, 2)
-    radii = np.abs(fits - centre).max(axis=0, initial=0.0)
-    gains = GainBounds(gc=float(centre[0]), gr=float(radii[0]), hc=float(centre[1]), hr=float(radii[1]))
+    u_unit, y_unit = (_power_of_two(max(float(np.nanmax(np.abs(r[i]))) for r in whole)) for i in (0, 1))
+    whole = [(u / u_unit, y / y_unit) for u, y in whole]
+    units = np.array([1.0, y_unit / u_unit])  # of g and h
+    pieces = [
+        _from_first_measurement(*piece)
+        for u, y in whole
+        for piece in zip(np.array_split(u, parts), np.array_split(y, parts), strict=True)
+    ]
+    centre, errors = _fit(whole)
+    fits = np.array([_fit([piece])[0] for piece in pieces if _moves(*piece)]).reshape(-1, 2)
+    radii = np.abs(fits - centre).max(axis=0, initial=0.0) + _STANDARD_ERRORS * errors
+    radii[0] = max(radii[0], safety_factor * _largest_step_deviation(whole, *centre))
+    radii[1] += abs(_one_step_fit(whole)[1] - centre[1])
     error = max(float(np.nanmax(np.abs(_simulation_error(u, y, *centre)))) for u, y in whole)
-    return FirstOrderFit(gains, fits, error)
+    (gc, hc), (gr, hr) = (units * centre).tolist(), (units * radii).tolist()
+    return FirstOrderFit(GainBounds(gc, gr, hc, hr), units * fits, len(pieces) - len(fits), y_unit * error)
+
+
+def _power_of_two(size: float) -> float:
+    """The power of two next above a size, as the unit in which the fit is made; 1 for zero."""
+    return float(2.0 ** np.frexp(size)[1])
+
+
+def _largest_step_deviation(records: Sequence[tuple[Array, Array]], g: float, h: float) -> float:
+    """Of the pole of a single step from g, over the samples that are far enough from their target."""
+    away = np.concatenate([(y - h * u)[:-1] for u, y in records])
+    left = np.concatenate([y[1:] - h * u[:-1] - g * (y - h * u)[:-1] for u, y in records])
+    known = ~np.isnan(left)
+    distance, error = np.abs(away[known]), np.abs(left[known])
+    if not distance.size:
+        return 0.0
+    at_rest = error[distance <= np.quantile(distance, 0.25)].max()
+    least = np.sort(distance)[-min(_LEAST, distance.size)]
+    rounding = np.finfo(float).eps * max(float(np.nanmax(np.abs(y))) for _, y in records)
+    far = (distance >= min(_FAR * at_rest, least)) & (distance > _FAR * rounding)
+    return float(np.max(error[far] / distance[far], initial=0.0))
 
 
 def _channels(log: Log) -> tuple[Array, Array]:
     if log.u.shape[1:] != (1,) or log.y.shape[1:] != (1,):
         raise ValueError(f"log has u {log.u.shape} and y {log.y.shape}; expected one channel each")
-    known = np.flatnonzero(~np.isnan(log.y[:, 0]))
-    if len(known) < 3:
-        raise ValueError(f"log has {len(known)} measurements; expected at least three")
-    return log.u[known[0] :, 0], log.y[known[0] :, 0]
+    measured = int(np.sum(~np.isnan(log.y)))
+    if measured < 3:
+        raise ValueError(f"log has {measured} measurements; expected at least three")
+    return _from_first_measurement(log.u[:, 0], log.y[:, 0])
+
+
+def _from_first_measurement(u: Array, y: Array) -> tuple[Array, Array]:
+    """A record without the samples before its first measurement, from which a simulation can start."""
+    first = int(np.argmax(~np.isnan(y)))
+    return u[first:], y[first:]
 
 
 def _moves(u: Array, y: Array) -> bool:
     """Whether a part says anything of the pole."""
     known = y[~np.isnan(y)]
-    return bool(known.size > 2 and not np.isnan(y[0]) and np.ptp(known) > 0 and np.ptp(u) > 0)
+    return bool(known.size > 2 and np.ptp(known) > 0 and np.ptp(u) > 0)
 
 
-def _fit(records: Sequence[tuple[Array, Array]]) -> Array:
+def _fit(records: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """g and h (2,), and their standard errors (2,)."""
     from scipy.optimize import least_squares
 
     start = _one_step_fit(records)
@@ -92,11 +155,19 @@ def _fit(records: Sequence[tuple[Array, Array]]) -> Array:
         return found[~np.isnan(found)]
 
     fit = least_squares(errors, start, bounds=([-1.0, -np.inf], [1.0, np.inf]), x_scale=[0.01, 0.01], xtol=1e-12)
-    if not abs(fit.x[0]) < 1 - 1e-9:
+    if not (1 - abs(fit.x[0])) * max(u.size for u, _ in records) > _SHORTEST:
         raise ValueError(
             f"the fitted pole is {fit.x[0]:g}; expected |g| < 1: is the input column the command of the output?"
         )
-    return np.asarray(fit.x, dtype=float)
+    return np.asarray(fit.x, dtype=float), _standard_errors(fit.jac, fit.fun)
+
+
+def _standard_errors(jacobian: Array, errors: Array) -> Array:
+    """Of a least-squares fit whose errors are correlated within blocks of samples."""
+    blocks = zip(np.array_split(jacobian, _BLOCKS), np.array_split(errors, _BLOCKS), strict=True)
+    scores = np.array([J.T @ e for J, e in blocks])
+    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    return np.asarray(np.sqrt(np.diag(inverse @ scores.T @ scores @ inverse)))
 
 
 def _one_step_fit(records: Sequence[tuple[Array, Array]]) -> Array:

@@ -136,13 +136,24 @@ class NoiseCharacterization:
 def moving_average_extremes(signals: Sequence[Array], qbar: int) -> Array:
     """Largest size of a mean over q samples in all signals, (qbar,); NaN where no signal has q samples.
 
-    Time O(n qbar), vectorised by the compiler over q; rounding stays at some 1e-12 of the largest sample.
+    Time O(n qbar), vectorised by the compiler over q. Sums are kept in pairs of floats, so that each mean is the exact
+    one rounded once (but for 1e-24 of the largest sample): those of a constant are that constant.
     """
-    best = np.zeros(qbar)
+    best, low = np.zeros(qbar), np.zeros(qbar)
     for signal in signals:
-        _extreme_sums(signal, best, _BLOCK)
-    best[max(s.size for s in signals) :] = np.nan
-    return best / np.arange(1, qbar + 1)
+        _extreme_sums(signal, best, low, _BLOCK)
+    q = np.arange(1, qbar + 1)
+    mean = best / q
+    mean += (_remainder(best, mean, q) + low) / q
+    mean[max(s.size for s in signals) :] = np.nan
+    return mean
+
+
+def _remainder(total: Array, mean: Array, count: NDArray[np.int64]) -> Array:
+    """total - mean count, exactly up to one rounding: the product in two floats (Dekker)."""
+    high = (mean * 134217729.0) - (mean * 134217729.0 - mean)
+    product = mean * count
+    return np.asarray((total - product) - ((high * count - product) + (mean - high) * count))
 
 
 def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
@@ -163,22 +174,37 @@ def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
 
 
 @njit(cache=True)
-def _extreme_sums(u, best, block):  # type: ignore[no-untyped-def]
-    """Raise best[q - 1] to the largest size of a sum of q consecutive samples of u, for every q with a full window.
+def _extreme_sums(u, best, low, block):  # type: ignore[no-untyped-def]
+    """Raise best[q - 1] + low[q - 1] to the largest size of a sum of q consecutive samples, for each full window.
 
-    ``sums`` holds the partial sums of a block and of the qbar samples before it backwards, so that the inner loop
-    walks two arrays side by side.
+    ``sums`` and ``rest`` hold the partial sums of a block and of the qbar samples before it, in two floats each and
+    backwards, so that the inner loop walks arrays side by side. Additions keep their rounding errors (Knuth's TwoSum).
     """
     qbar = best.size
-    sums = np.empty(block + qbar)
+    sums, rest = np.empty(block + qbar), np.empty(block + qbar)
     for start in range(0, u.size, block):
         first, stop = max(0, start - qbar + 1), min(start + block, u.size)
         m = stop - first
-        sums[m] = 0.0
+        sums[m] = rest[m] = 0.0
         for i in range(m):
-            sums[m - i - 1] = sums[m - i] + u[first + i]
+            a, b = sums[m - i], u[first + i]
+            total = a + b
+            part = total - a
+            sums[m - i - 1] = total
+            rest[m - i - 1] = rest[m - i] + ((a - (total - part)) + (b - part))
         for j in range(start - first + 1, m + 1):
-            now, before = sums[m - j], sums[m - j + 1 : m - j + 1 + min(qbar, j)]
-            for q in range(before.size):
-                size = abs(now - before[q])
-                best[q] = size if size > best[q] else best[q]
+            now, fine = sums[m - j], rest[m - j]
+            count = min(qbar, j)
+            before, finer = sums[m - j + 1 : m - j + 1 + count], rest[m - j + 1 : m - j + 1 + count]
+            for q in range(count):
+                b = -before[q]
+                total = now + b
+                part = total - now
+                error = ((now - (total - part)) + (b - part)) + (fine - finer[q])
+                size = abs(total)
+                error = error if total > 0.0 else -error
+                if total == 0.0:
+                    error = abs(error)
+                larger = size - best[q] + (error - low[q]) > 0.0
+                best[q] = size if larger else best[q]
+                low[q] = error if larger else low[q]

@@ -41,8 +41,8 @@ def first_order_filter(signal: ArrayLike, pole: float) -> Array:
     r = values[known]
     if not r.size:
         return values.copy()
-    filtered = lfilter([1 - pole], [1.0, -pole], r, zi=[pole * r[0]])[0]
-    filtered[0] = r[0]
+    rest = lfilter([1 - pole], [1.0, -pole], r[1:], zi=[pole * r[0]])[0]  # the recursion's own operations, to the bit
+    filtered = np.append(r[0], rest)
     count = np.cumsum(known)
     return np.where(count > 0, filtered[np.maximum(count - 1, 0)], np.nan)
 

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from svo.interval.residual import check_pole
 
 Array = NDArray[np.float64]
+_EPS, _SMALLEST = float(np.finfo(float).eps), float(np.finfo(float).smallest_subnormal)
 
 
 def filter_bound(
@@ -49,15 +50,22 @@ def threshold_sequence(bounds: ArrayLike, pole: float) -> Array:
     """tau_k for k = 0..qbar, (qbar + 1,): the bound of a filter of static gain one that starts at its first input.
 
     Corollary 2: `filter_bound` with b = 1 - a, c = 1, r = k and mu = lambda_1. From k = qbar on it is constant (13).
+
+    Rounded outward: a signal of floats whose means are at most lambda_q, as `NoiseCharacterization.check` finds them,
+    stays at or below it in `first_order_filter`, which computes in floats too. For that each tau_k is larger by at most
+    (k + 16) eps of itself and 2 eps lambda_1 / (1 - a), eps = 2.2e-16.
     """
     lam = checked_bounds(bounds)
     check_pole(pole)
     q = np.arange(1, lam.size + 1)
     powers = float(pole) ** np.arange(lam.size + 1)  # a^0 .. a^qbar
-    inner = np.concatenate([[0.0], np.cumsum(q * (powers[:-1] - powers[1:]) * lam)])
+    inner = np.concatenate([[0.0], np.cumsum(q * (powers[:-1] * (1 - pole)) * lam)])
     tau = powers * lam[0]
     tau[1:] += (1 - pole) * (q * powers[:-1] * lam + inner[:-1])
-    return tau
+    # All terms are positive: products of five factors, a sum of k, and means that a check rounds once.
+    relative = (np.arange(lam.size + 1) + 16) * _EPS
+    # A step of the filter errs by at most 3/2 eps of the largest of its terms, and forgets with 1 - a.
+    return np.asarray(tau * (1 + relative) + (2 * _EPS * lam[0] + _SMALLEST * (q.size + 4)) / (1 - pole))
 
 
 def checked_bounds(bounds: ArrayLike) -> Array:
