@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from svo.cli.destinations import writable_folder, writable_log
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors, plant_to_simulate
+from svo.cli.frame import PREPARING, announce, app, chosen_noise, note, one_line_errors, plant_to_simulate
 from svo.cli.options import AsJson, NoiseName, PlantName
 from svo.cli.output import describe, print_detector_study, print_json, print_study
 
@@ -109,7 +109,7 @@ def study(
             the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
         )
         for line in StudyFolder(out).check(configuration, resume):
-            typer.echo(f"note: {line}", err=True)
+            note(line)
         if isinstance(the_plant, LearnsDetectors):
             _study_detectors(the_plant, configuration, out, workers, scheduler, resume, as_json)
             return
@@ -161,7 +161,7 @@ def report(
         else:
             publish(study, the_plant, without_damaged)
         for line in study.notes():
-            typer.echo(f"note: {line}", err=True)
+            note(line)
         typer.echo(f"Report: {folder / 'report.html'}")
 
 

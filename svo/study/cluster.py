@@ -6,7 +6,10 @@ same software, the plant's distribution included.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -41,7 +44,7 @@ def outcomes_on_cluster(work: Callable[[Job], Outcome], jobs: list[Job], schedul
     Parameters
     ----------
     work : function of a job
-        Can be pickled, as its answer can.
+        Can be pickled, as its answer can; what it raises names the run, as a RuntimeError.
     jobs : list of Job
     scheduler : str
         Address of the cluster's scheduler, such as ``tcp://127.0.0.1:8786``.
@@ -53,17 +56,43 @@ def outcomes_on_cluster(work: Callable[[Job], Outcome], jobs: list[Job], schedul
     ValueError
         If nothing answers at the address, or it has no workers.
     RuntimeError
-        If a worker has other versions of the software, or a run fails.
+        If a worker has other versions of the software, a run fails, or the scheduler is lost.
     """
-    with _connected(scheduler) as client:
+    _need_distributed()
+    with _quiet(), _connected(scheduler) as client, _scheduler_there(scheduler):
         _check_workers(client, scheduler)
         yield from _run_all(client, work, jobs)
+
+
+@contextmanager
+def _scheduler_there(scheduler: str) -> Iterator[None]:
+    try:
+        yield
+    except (CancelledError, OSError) as error:  # one of a run itself is a RuntimeError by now
+        raise RuntimeError(
+            f"the dask scheduler at {scheduler!r} is lost (it ended, or the network did); the runs that are done are "
+            "kept: start it and its workers again and go on with --resume"
+        ) from error
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What goes wrong on the cluster is said once, by us, instead of with the tracebacks of its client."""
+    loggers = [logging.getLogger(f"distributed{part}") for part in ("", ".client", ".core", ".comm", ".utils")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def _run_all(client: Client, work: Callable[[Job], Outcome], jobs: list[Job]) -> Iterator[Outcome]:
     from distributed import as_completed
 
-    waiting = iter(jobs)
+    waiting, done = iter(jobs), 0
 
     def hand_out(count: int) -> list[Any]:
         # Not pure: a study that is started anew must run anew.
@@ -73,7 +102,10 @@ def _run_all(client: Client, work: Callable[[Job], Outcome], jobs: list[Job]) ->
     for future in running:
         outcome: Outcome = _result(future)
         running.update(hand_out(1))
+        done += 1
         yield outcome
+    if done < len(jobs):  # a client that lost its scheduler may have nothing left to wait for
+        raise CancelledError
 
 
 def _result(future: Any) -> Any:
@@ -89,11 +121,22 @@ def _result(future: Any) -> Any:
         future.release()
 
 
-def _connected(scheduler: str) -> Client:
+def _need_distributed() -> None:
+    """Import it, which also sets the levels of its loggers."""
     try:
-        from distributed import Client
+        import distributed  # noqa: F401
     except ImportError as error:
         raise ImportError("--scheduler needs the extra 'cluster': pip install 'svo-fdi[cluster]'") from error
+
+
+def _connected(scheduler: str) -> Client:
+    from distributed import Client, Security
+
+    if scheduler.startswith("tls:") and Security().get_connection_args("client").get("ssl_context") is None:
+        raise ValueError(
+            f"the scheduler's address is {scheduler!r}, and there is no certificate of this process; set "
+            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and the others of docs/studies.md, 'On a cluster'"
+        )
     try:
         return Client(scheduler, timeout=_CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:

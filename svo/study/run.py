@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 
@@ -82,8 +84,15 @@ def registered_plant(name: str) -> Plant:
 
 def run_registered(plant: str, job: Job) -> RunOutcome:
     """One run of a registered plant, in whatever process; RuntimeError that names the run if it fails."""
-    try:
+    with failure_named(job):
         return execute(registered_plant(plant), job)
+
+
+@contextmanager
+def failure_named(job: Job) -> Iterator[None]:
+    """Turn what a run raises into a RuntimeError that names the run."""
+    try:
+        yield
     except Exception as error:
         where = f"fault {job.fault}, profile {job.profile}, noise {job.noise}, seed {job.seed}"
         raise RuntimeError(f"run {job.run} ({where}) failed: {type(error).__name__}: {error}") from error

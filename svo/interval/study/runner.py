@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from svo.interval.study.run import DetectorRow, LearnsDetectors, execute
-from svo.plant import Plant, load_plant
 from svo.study.cluster import outcomes_on_cluster
 from svo.study.configuration import Job, StudyConfiguration
+from svo.study.run import failure_named, registered_plant
 from svo.study.store import StudyStore
 
 Progress = Callable[[int, int], None]
@@ -44,7 +44,7 @@ def run_detection_study(
     """
     if workers < 1:
         raise ValueError(f"workers is {workers}; expected at least 1 process")
-    plant = load_plant(configuration.plant)
+    plant = registered_plant(configuration.plant)
     if not isinstance(plant, LearnsDetectors):
         raise TypeError(f"plant {configuration.plant!r} has no interval detectors; it lacks members of LearnsDetectors")
     folder = DetectorStudyFolder(Path(out))
@@ -82,11 +82,7 @@ def _results(name: str, jobs: list[Job], workers: int, scheduler: str | None) ->
 
 
 def _execute(name: str, job: Job) -> list[DetectorRow]:
-    plant = _plant(name)
+    plant = registered_plant(name)
     assert isinstance(plant, LearnsDetectors)
-    return execute(plant, job)
-
-
-@functools.cache
-def _plant(name: str) -> Plant:
-    return load_plant(name)
+    with failure_named(job):
+        return execute(plant, job)

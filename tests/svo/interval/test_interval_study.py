@@ -81,7 +81,7 @@ def test_what_is_published(folder) -> None:  # type: ignore[no-untyped-def]
     found = publish(folder, PLANT)
     files = {path.name for path in folder.path.iterdir()}
     assert {"report.html", "summary.csv", "detection_times_conservative.png", "assumption_conservative.png"} <= files
-    assert "http:" not in (folder.path / "report.html").read_text(encoding="utf-8").replace("http://www.w3.org", "")
+    assert "://" not in (folder.path / "report.html").read_text(encoding="utf-8").replace("http://www.w3.org", "")
     jam = next(s for s in found.summaries if (s.profile, s.detector, s.records) == ("moving", "a = 0.6", 1))
     assert jam.paper == 14.55
     assert jam.time_of(jam.detect.median) == pytest.approx(14.55, abs=0.02)

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -77,3 +82,52 @@ def test_a_cluster_without_workers_is_one_clear_error(registered_tank: str, tmp_
         pytest.raises(ValueError, match="has no workers"),
     ):
         run_study(wanted, tmp_path, scheduler=cluster.scheduler_address)
+
+
+def test_a_certificate_is_asked_for(registered_tank: str, tmp_path: Path) -> None:
+    wanted = StudyConfiguration.for_plant(load_plant(registered_tank), runs=1, seed=3)
+    with pytest.raises(ValueError, match="there is no certificate of this process"):
+        run_study(wanted, tmp_path, scheduler="tls://127.0.0.1:8786")
+
+
+@pytest.fixture
+def processes(registered_tank: str, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """A scheduler in a process of its own, with a worker in another, and its address."""
+    file = tmp_path / "scheduler.json"
+    start = [sys.executable, "-m"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    own = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", file]
+    scheduler = subprocess.Popen([*start, "distributed.cli.dask_scheduler", "--port", "0", *own], **quiet)
+    worker = subprocess.Popen([*start, "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", *own], **quiet)
+    try:
+        for _ in range(300):
+            with contextlib.suppress(OSError, ValueError, KeyError):
+                address = json.loads(file.read_text())["address"]
+                break
+            time.sleep(0.1)
+        else:
+            pytest.fail("the scheduler has no address after 30 s")
+        with distributed.Client(address, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=30)
+        yield scheduler, address
+    finally:
+        for process in (worker, scheduler):
+            process.kill()
+            process.wait()
+
+
+def test_a_scheduler_that_is_killed_is_one_clear_error_and_the_study_goes_on(
+    processes: tuple[subprocess.Popen[bytes], str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scheduler, address = processes
+    wanted = StudyConfiguration.for_plant(load_plant("tank"), runs=10, seed=3)
+
+    def kill_it(done: int, of: int) -> None:
+        if done == 3:
+            scheduler.kill()
+
+    with pytest.raises(RuntimeError, match=r"the dask scheduler at .* is lost .*--resume"):
+        run_study(wanted, tmp_path / "out", scheduler=address, progress=kill_it)
+    assert "Traceback" not in capfd.readouterr().err
+    resumed = run_study(wanted, tmp_path / "out", resume=True)
+    assert [row.run for row in resumed.rows()] == list(range(40))
