@@ -56,6 +56,12 @@ class Detection:
         """Models that explain the data to the end."""
         return self._alive(-1)
 
+    @property
+    def restarted(self) -> tuple[str, ...]:
+        """Models that were falsified, began again (`recovery` of the bank) and explain the data to the end."""
+        falsified = {alarm.observer for alarm in self.alarms}
+        return tuple(name for name in self.alive if name in falsified)
+
     def to_dict(self) -> dict[str, Any]:
         """Everything but the certificates, for JSON; ``changes`` lists the verdict whenever it changed."""
         record = self.record
@@ -68,6 +74,7 @@ class Detection:
             "isolated_s": self.isolated_s,
             "fault": record.fault,
             "alive": list(self.alive),
+            "restarted": list(self.restarted),
             "falsified_s": {alarm.observer: alarm.time for alarm in self.alarms},
             "undecided": int(record.undecided.sum()),
             "changes": [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal, localcontext
 from typing import Any
 
 import numpy as np
@@ -51,11 +52,19 @@ class LogCalibration:
             return f"Nothing to widen: the nominal model explains {samples}."
         kind = "The smallest" if self.result.smallest else "A sufficient"
         lines = [
-            f"    {w.bound}: + {w.amount:.4g} ({100 * w.relative:.3g} % of the bound), "
+            f"    {w.bound}: + {rounded_up(w.amount, 4)} ({rounded_up(100 * w.relative, 3)} % of the bound), "
             f"first needed at {self.time[w.sample]:g} s (sample {w.sample})"
             for w in self.result.widenings
         ]
         return "\n".join([f"{kind} widening with which the nominal model explains {samples}, in model units:", *lines])
+
+
+def rounded_up(value: float, digits: int) -> str:
+    """A positive number in so many digits, and no smaller than it: what is typed into a file must suffice."""
+    exact = Decimal(value)
+    with localcontext() as context:
+        context.prec, context.rounding = digits, ROUND_CEILING
+        return f"{(+exact).normalize():g}"
 
 
 def calibrate_log(plant: MonitoredPlant, log: Log, noise: str) -> LogCalibration:

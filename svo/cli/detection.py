@@ -44,10 +44,11 @@ def detect(
         the_plant = in_architecture(find_plant(plant), architecture)
         noise = chosen_noise(the_plant, noise)
         samples = measured_log(log, the_plant)
+        # First, for it takes no time, and what it may refuse would cost the bank's answer.
+        crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
         announce(PREPARING)
         with progress("Samples") as update:
             found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
-        crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
         beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
         if out is not None:
             write_detection(out, found, beside)

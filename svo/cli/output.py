@@ -103,7 +103,8 @@ def print_detection(found: Detection) -> None:
     for alarm in found.alarms:
         say(f"    {alarm.observer}: falsified at {alarm.time:g} s")
     for name in found.alive:
-        say(f"    {name}: explains the data to the end")
+        again = ", begun again after it was falsified (recovery)" if name in found.restarted else ""
+        say(f"    {name}: explains the data to the end{again}")
     if not found.alive:
         say(f"No model explains the data from {max(alarm.time for alarm in found.alarms):g} s on.")
     undecided = int(found.record.undecided.sum())

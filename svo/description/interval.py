@@ -95,14 +95,26 @@ def interval_settings(top: Table, columns: Columns) -> IntervalSettings | None:
     options = {key: table.number(key) for key in ("slope", "limit") if key in table}
     with table.errors():
         gains = GainBounds(gc=g[0], gr=g[1], hc=h[0], hr=h[1], **options)
+    widest = max(min(g[1], options.get("limit", np.inf)), options.get("limit", 0.0) if options.get("slope") else 0.0)
+    if not abs(g[0]) + widest < 1:
+        found = f"is {list(g)}, so |g| may be {abs(g[0]) + widest:g}"
+        raise table.error("g", f"{found}; expected less than 1, by a smaller radius or a limit")
+    pole, radius, factor = table.number("pole"), table.number("initial_radius"), table.number("safety_factor", 1.2)
+    for key, value, holds, expected in (
+        ("pole", pole, 0 <= pole < 1, "0 <= pole < 1"),
+        ("initial_radius", radius, radius >= 0, "a number >= 0"),
+        ("safety_factor", factor, factor > 1, "a number > 1, such as 1.2"),
+    ):
+        if not holds:
+            raise table.error(key, f"is {value:g}; expected {expected}")
     return IntervalSettings(
         u=_position(table, "input", [c.name for c in columns.inputs]),
         y=_position(table, "output", [c.name for c in columns.outputs]),
         gains=gains,
-        initial_radius=table.number("initial_radius"),
-        pole=table.number("pole"),
+        initial_radius=radius,
+        pole=pole,
         qbar=table.count("qbar", 200),
-        safety_factor=table.number("safety_factor", 1.2),
+        safety_factor=factor,
         records=tuple(table.path.parent / table.file_beside("records", name) for name in _names(table, "records")),
         learn_until_s=table.number("learn_until_s") if "learn_until_s" in table else None,
     )

@@ -156,6 +156,19 @@ class ActuatorFault:
             gain, offset = np.ones_like(p), p * self._size * self._drawn(t)
         return ActuatorLaw(gain=gain, hold=hold, offset=offset, lower=lower, upper=upper)
 
+    def reach(self, commands: tuple[float, float]) -> tuple[float, float]:
+        """Least and largest deflection that this fault at any of its sizes makes of commands between two values."""
+        lower, upper = commands
+        if self.kind in ("oscillatory-liquid", "noise"):
+            return lower - self._size, upper + self._size
+        ends = {
+            "loss": lambda: ((1 - self._size) * lower, (1 - self._size) * upper),
+            "floating": lambda: (0.0, 0.0),
+            "hard-over": lambda: (self._size, self._size),
+            "oscillatory-solid": lambda: (-self._size, self._size),
+        }.get(self.kind, lambda: self.travel or commands)()
+        return min(lower, *ends), max(upper, *ends)
+
     def corrupt(self, t: ArrayLike, u: ArrayLike, held: ArrayLike | None = None) -> Array:
         """Achieved deflections from commands.
 

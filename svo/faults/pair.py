@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 from svo.faults.actuator import ActuatorFault
+from svo.faults.blocks import channels
 from svo.faults.plant import PlantFault
 from svo.faults.sensor import SensorFault
 from svo.model import UncertainModel
@@ -31,18 +32,31 @@ class FaultPair:
                 raise TypeError(f"{name} is a {type(getattr(self, name)).__name__}; expected a fault of svo.faults")
 
     def model(self, nominal: UncertainModel) -> UncertainModel:
-        """The observer's model of the pair; it contains ``nominal`` and the model of each fault alone."""
+        """The observer's model of the pair; it contains ``nominal`` and the model of each fault alone.
+
+        Beside locking or a runaway that is so for commands within the travel, as of these faults alone.
+        """
         for fault in self._in_order():
             nominal = fault.model(nominal)
         return nominal
 
     def _in_order(self) -> list[Fault]:
         """Innermost first: the plant, then what drives it, then what measures it, so that no product is lost."""
-        both = (self.first, self.second)
+        both = (self.first, self._second())
         # An actuator's model acts on the command, before the faults that the model has already.
         actuators = [f for f in reversed(both) if isinstance(f, ActuatorFault)]
         sensors = [f for f in both if isinstance(f, SensorFault)]
         return [*(f for f in both if isinstance(f, PlantFault)), *actuators, *sensors]
+
+    def _second(self) -> Fault:
+        """The second fault; a travel that it has is that of the command, and must let through what the first does."""
+        first, second = self.first, self.second
+        if not (isinstance(first, ActuatorFault) and isinstance(second, ActuatorFault)) or second.travel is None:
+            return second
+        if not set(channels(first.where)) & set(channels(second.where)):
+            return second
+        return replace(second, travel=first.reach(second.travel))
+
 
 
 def pairs(faults: Mapping[str, Fault]) -> dict[str, FaultPair]:

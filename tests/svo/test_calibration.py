@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from polytopes import HPolytope
 from svo import Log, UncertainModel, Uncertainty, WindowObserver, calibrate
 from svo.cli import app
+from svo.log_calibration import rounded_up
 from tests.svo.observers.random_plants import random_plant
 
 Array = NDArray[np.float64]
@@ -205,3 +206,12 @@ def test_the_command_fails_clearly_without_a_log(registered_tank: str, tmp_path:
     result = CliRunner().invoke(app, ["calibrate", "tank", str(tmp_path / "none.csv")])
     assert result.exit_code == 1
     assert "No such file" in result.stderr
+
+
+@pytest.mark.parametrize("digits", [1, 3, 4, 9])
+def test_printed_figures_are_rounded_up(digits: int) -> None:
+    rng = np.random.default_rng(digits)
+    for value in (*10.0 ** rng.uniform(-12, 12, 200), 0.5, 1.0, 1234.0, 9.9999999999):
+        text = rounded_up(float(value), digits)
+        assert value <= float(text) <= value * (1 + 10.0 ** (1 - digits))
+        assert len(text.split("e")[0].replace(".", "").strip("0")) <= digits

@@ -108,6 +108,41 @@ def test_a_pair_contains_its_faults_and_the_healthy_plant(seed: int) -> None:
         assert verdict(pair.model(plant), log) == "consistent", name
 
 
+REACH = {
+    "hard-over": actuator("hard-over", 1.5),
+    "loss": actuator("loss", 1.0),
+    "floating": actuator("floating", None),
+    "solid": actuator("oscillatory-solid", 2.5, frequency_hz=1.3),
+    "liquid": actuator("oscillatory-liquid", 1.5, frequency_hz=1.3),
+    "noise": actuator("noise", 0.7, seed=1),
+    "locking": actuator("locking", None, travel=(-2.0, 0.5)),
+    "runaway": actuator("runaway", 3.0, travel=(0.5, 4.0)),
+}
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("travel", [(-1.0, 1.0), (0.6, 1.0), (-0.5, -0.4)])
+@pytest.mark.parametrize("name", REACH)
+def test_a_pair_with_a_narrow_travel_contains_what_the_other_fault_does_alone(
+    name: str, travel: tuple[float, float], turned: bool
+) -> None:
+    """Hard-over at 1.5 beside locking within 1: the travel alone, in one order, never let 1.5 through."""
+    other, locked = REACH[name], actuator("locking", None, travel=travel)
+    pair, plant = FaultPair(*((other, locked) if turned else (locked, other))), nominal_plant()
+    low, high = travel
+    if other.travel is not None:  # commands that a healthy actuator of both kinds follows
+        low, high = max(low, other.travel[0]), min(high, other.travel[1])
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        u = np.linspace(low, high, 12)[:, None] if low <= high else np.full((12, 1), low)
+        for alone in (pair.first, pair.second):
+            log = alone.model(plant).simulate([0.0, 0.0], u, rng, corners=True)
+            assert verdict(pair.model(plant), log) == "consistent"
+        achieved = other.corrupt(np.arange(12) * TS, u)
+        log = plant.simulate([0.0, 0.0], achieved, rng, corners=True)
+        assert verdict(pair.model(plant), Log(time=log.time, u=u, y=log.y)) == "consistent"
+
+
 def test_bad_arguments_are_refused_by_name() -> None:
     one = sensor("bias", 1.0)
     with pytest.raises(ValueError, match="faults has 1 entries; expected at least two"):

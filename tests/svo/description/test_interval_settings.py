@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +129,64 @@ def test_a_mistake_is_one_error_with_its_place(tmp_path: Path, change: tuple[str
 def test_a_time_outside_the_log_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"learn_until_s is 3 s, but the log goes from 0 s to 0\.99 s"):
         described(tmp_path).detect_thresholds(run_of(100, 0))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("g = [0.9, 0.005]", "g = [0.9, 0.2]"), r"'g': is \[0.9, 0.2\], so |g| may be 1.1; expected less than 1"),
+        (("g = [0.9, 0.005]", "g = [-1.5, 0.0]"), "may be 1.5; expected less than 1"),
+        (("pole = 0.8", "pole = 0.8\nslope = 1.0\nlimit = 0.3"), "may be 1.2; expected less than 1"),
+        (("pole = 0.8", "pole = 1.0"), "'pole': is 1; expected 0 <= pole < 1"),
+        (("initial_radius = 0.02", "initial_radius = -0.1"), "'initial_radius': is -0.1; expected a number >= 0"),
+        (("qbar = 20", "qbar = 20\nsafety_factor = 1.0"), "'safety_factor': is 1; expected a number > 1"),
+    ],
+)
+def test_settings_that_cannot_work_are_refused_before_any_sample(
+    tmp_path: Path, change: tuple[str, str], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message.replace("|", r"\|")):
+        described(tmp_path, change)
+
+
+def test_a_limit_keeps_a_wide_radius_stable(tmp_path: Path) -> None:
+    described(tmp_path, ("g = [0.9, 0.005]", "g = [0.9, 0.2]"), ("pole = 0.8", "pole = 0.8\nlimit = 0.05"))
+
+
+def test_what_the_interval_detector_refuses_costs_no_answer_of_the_bank(tmp_path: Path, monkeypatch: Any) -> None:
+    """It is asked first: the bank's whole run was lost before."""
+    plant = described(tmp_path, ("learn_until_s = 3.0", "learn_until_s = 99.0"))
+    write_log(tmp_path / "log.csv", run_of(100, 0), plant.columns)
+    monkeypatch.setattr("svo.detect.detect", lambda *_, **__: pytest.fail("the bank ran before"))
+    done = CliRunner().invoke(app, ["detect", str(tmp_path / "servo.toml"), str(tmp_path / "log.csv")])
+    assert done.exit_code == 1
+    assert "learn_until_s is 99 s" in done.stderr
+
+
+def test_calibrated_figures_typed_into_the_file_explain_the_log(tmp_path: Path) -> None:
+    """Rounded to nearest they did not, in 12 of 12."""
+    for seed in range(12):
+        shorter = ("learn_until_s = 3.0", "learn_until_s = 0.3")
+        plant = described(tmp_path, ("n = [0.05]", "n = [0.02]"), shorter)
+        write_log(tmp_path / "log.csv", run_of(60, seed), plant.columns)
+        arguments = [str(tmp_path / "servo.toml"), str(tmp_path / "log.csv")]
+        text = CliRunner().invoke(app, ["calibrate", *arguments]).stdout
+        amount, percent = re.search(r"noise y: \+ (\S+) \((\S+) %", text).groups()  # type: ignore[union-attr]
+        for wider in (0.02 + float(amount), 0.02 * (1 + float(percent) / 100)):
+            described(tmp_path, ("n = [0.05]", f"n = [{wider!r}]"), shorter)
+            assert "No fault: the nominal model explains" in CliRunner().invoke(app, ["detect", *arguments]).stdout
+
+
+def test_a_model_that_was_falsified_and_began_again_has_a_remark(tmp_path: Path) -> None:
+    log = run_of(400, 1)
+    log.y[200:203] += 0.5
+    plant = described(tmp_path, ("[interval_detector]", "[bank]\ndebounce = 2\nrecovery = 20\n[interval_detector]"))
+    write_log(tmp_path / "log.csv", log, plant.columns)
+    arguments = ["detect", str(tmp_path / "servo.toml"), str(tmp_path / "log.csv")]
+    text = CliRunner().invoke(app, arguments).stdout
+    assert "nominal: falsified at 2.01 s" in text
+    assert "nominal: explains the data to the end, begun again after it was falsified" in text
+    assert json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)["restarted"] == ["nominal"]
 
 
 def test_the_command_reports_both_and_keeps_them_apart(tmp_path: Path) -> None:
