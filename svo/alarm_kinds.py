@@ -25,6 +25,7 @@ from svo.alarm_values import (
 )
 from svo.log import Log
 from svo.model_digest import ModelSample
+from svo.normal_form import Exponents
 from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.polytope_step import MeasuredOutput, PolytopeCertificate
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
@@ -103,7 +104,7 @@ def output_difference(k: int, y: Array, u: Array, driven: bool, log: Log) -> str
 
 # -- what every kind may hold -------------------------------------------------------------------------------------
 
-_LARGEST_AT = "largest_at"
+_LARGEST_AT, _UNITS = "largest_at", "units"
 
 
 def _names(kind: type) -> set[str]:
@@ -111,9 +112,12 @@ def _names(kind: type) -> set[str]:
 
 
 def _entries(kind: type, record: Any) -> set[str]:
-    """Entries of a record of this kind: that of the largest set is there only where it is a premise."""
-    optional = {_LARGEST_AT} if isinstance(record, Mapping) and _LARGEST_AT not in record else set()
-    return _names(kind) - optional
+    """Entries of a record of this kind.
+
+    That of the largest set is there only where it is a premise; that of units since observers have a normal form.
+    """
+    absent = {_LARGEST_AT, _UNITS} - record.keys() if isinstance(record, Mapping) else set()
+    return _names(kind) - absent
 
 
 def _largest_at(record: Mapping[str, Any]) -> int | None:
@@ -130,7 +134,7 @@ def _started_again(largest_at: int | None, last: int, sample: int) -> str:
 # -- window observers --------------------------------------------------------------------------------------------
 
 
-_NO_ARRAYS = {"first", "last", "n", "late", "owner", "arrival", "samples", _LARGEST_AT}
+_NO_ARRAYS = {"first", "last", "n", "late", "owner", "arrival", "samples", _LARGEST_AT, _UNITS}
 
 
 def _decode_window(record: Any) -> WindowCertificate:
@@ -149,6 +153,7 @@ def _decode_window(record: Any) -> WindowCertificate:
         arrival=ArrivalSet(**decode_arrays(record["arrival"], _names(ArrivalSet))),
         samples=tuple(WindowSample(**decode_arrays(sample, _names(WindowSample))) for sample in record["samples"]),
         largest_at=_largest_at(record),
+        units=_decode_units(record[_UNITS]) if _UNITS in record else None,
         **arrays,
     )
 
@@ -156,6 +161,11 @@ def _decode_window(record: Any) -> WindowCertificate:
 def _window_proves(c: WindowCertificate, sample: int) -> str:
     known = "the readings of its window alone" if c.arrival.is_unknown else "the arrival set"
     return known + _started_again(c.largest_at, c.last, sample)
+
+
+def _decode_units(record: Any) -> Exponents:
+    check_keys(record, _names(Exponents))
+    return Exponents(**{name: decode_integers(value) for name, value in record.items()})
 
 
 def _window_difference(c: WindowCertificate, last: int, log: Log) -> str | None:

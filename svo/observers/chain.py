@@ -148,7 +148,7 @@ class ProvingObserver(WindowObserver):
     def like(cls, observer: WindowObserver) -> ProvingObserver:
         """One with the settings and the initial set of another, before its first sample."""
         again = cls.__new__(cls)
-        again._configure(observer.model, observer.horizon, observer._template, observer.eps, 0)
+        again._configure(observer._form, observer.horizon, observer._template, observer.eps, 0)
         again.checked, again.unproven = 0, []
         again._begin_first(observer._initial)
         return again
@@ -214,7 +214,7 @@ class ProvingObserver(WindowObserver):
         i, lower = program // 2, program % 2 == 1
         bound = exact(-self._arrays["new_lower"][i] if lower else self._arrays["new_upper"][i])
         direction = -self._arrays["T"][i] if lower else self._arrays["T"][i]
-        proven = self._bound_by_multipliers(program, target, direction)
+        proven = self._proven(program, target, direction)
         what = f"arrival bound {program} of sample {target + self._origin}"
         self._count(proven is not None and proven <= bound, what)
 
@@ -227,7 +227,7 @@ class ProvingObserver(WindowObserver):
         bound = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q])
         known = self._known_part(f, time, v)
         bases = [None] if basis is None else [basis, None]
-        proofs = [self._bound_by_multipliers(b, time, f[: size.n]) for b in bases]
+        proofs = [self._proven(b, time, f[: size.n]) for b in bases]
         holds = any(proof is not None and proof + known <= bound for proof in proofs)
         what = f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time + self._origin}"
         self._count(holds, what)
@@ -242,17 +242,19 @@ class ProvingObserver(WindowObserver):
             total += exact(value) * exact(high if value > 0 else low)
         return total
 
-    def _bound_by_multipliers(self, basis: int | None, sample: int, direction: Array) -> fmpq | None:
-        """What the multipliers of the program solved last, whose basis is given, prove of a direction at a sample.
+    def _proven(self, basis: int | None, sample: int, direction: Array) -> fmpq | None:
+        """The bound of a direction (in normal form) at a sample that multipliers prove about the model as it is given.
 
-        None: without any multipliers. The sample is one of the window, as the kernel counts.
+        They are those of the program solved last, whose basis is given; None: without any. The sample is one of the
+        window, as the kernel counts.
         """
         w = self._arrays
         w["farkas"][:] = 0.0
         if basis is not None:
             k = int(w["k"][basis])
             w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
-        return self._certificate((sample, direction)).proven_bound(sample + self._origin, direction)
+        found = self._certificate((sample, direction))
+        return found.proven_bound(sample + self._origin, direction / self._form.x)
 
     def _count(self, holds: bool, what: str) -> None:
         self.checked += 1

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope, warm_up
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm, set_in
 from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.polytope_limits import readable, within_physical
 from svo.observers.polytope_restart import RestartingPolytope
@@ -20,7 +21,7 @@ from svo.observers.polytope_sets import PublishedRecursion, Sample, SoundRecursi
 from svo.observers.polytope_state import read_outcome, read_sample, read_set, write_outcome, write_sample, write_set
 from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
 from svo.observers.readings import NO_SAMPLE
-from svo.observers.window_setup import check_first_states, may_be_nonzero
+from svo.observers.window_setup import finite_box, may_be_nonzero
 
 Array = NDArray[np.float64]
 _PUBLISHED_STACKS = 4096
@@ -87,23 +88,28 @@ class PolytopeObserver(RestartingPolytope):
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        coupled = may_be_nonzero(model.F, *(item.F for item in model.uncertainties))
+        coupled = _is_coupled(model)
         smallest = 2 * (model.n_states + (model.n_disturbances if coupled else 0))
         if max_facets is not None and (not isinstance(max_facets, int | np.integer) or max_facets < smallest):
             raise ValueError(
                 f"max_facets is {max_facets!r}; expected an integer of at least {smallest}, or None for exact"
             )
-        self.model = model
-        self.horizon = int(horizon)
-        self.max_facets = max_facets
-        self.eps = float(eps)
         if as_published:
-            _check_published(model, coupled, self.horizon)
+            _check_published(model, coupled, int(horizon))
             warnings.warn(UNSOUND, UserWarning, stacklevel=2)
-            self._recursion = PublishedRecursion(model, self.horizon, max_facets, float(eps))
-        else:
-            self._recursion = SoundRecursion(model, self.horizon, max_facets, float(eps), coupled)
+        form = NormalForm.at(model, *finite_box(initial, model.n_states))
+        self._configure(form, int(horizon), max_facets, float(eps), as_published)
         self.reset(initial)
+
+    def _configure(
+        self, form: NormalForm, horizon: int, max_facets: int | None, eps: float, as_published: bool
+    ) -> None:
+        self.model, self._form, self._normal = form.given, form, form.model
+        self.horizon, self.max_facets, self.eps = horizon, max_facets, eps
+        if as_published:
+            self._recursion = PublishedRecursion(form.model, horizon, max_facets, eps)
+        else:
+            self._recursion = SoundRecursion(form.model, horizon, max_facets, eps, _is_coupled(form.given))
 
     def reset(self, set: HPolytope) -> None:
         """Forget all data; the state at the next measurement lies in ``set``.
@@ -113,8 +119,8 @@ class PolytopeObserver(RestartingPolytope):
         ValueError
             If the set is empty, unbounded or of the wrong dimension, or outside the model's physical range.
         """
-        _check_initial(set, self.model.n_states)
-        self._forget(within_physical(self.model.physical_range, set))
+        finite_box(set, self.model.n_states)
+        self._forget(within_physical(self._normal.physical_range, set_in(set, self._form.x)))
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> PolytopeStep:
         """The first measurement, without a transition.
@@ -164,7 +170,14 @@ class PolytopeObserver(RestartingPolytope):
         if self._number < 0:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
         sample = self._sample(self._number + 1, y, following, schedule)
-        return self._answer(inputs, sample, y, begun)
+        return self._answer(self._form.inputs(inputs), sample, y, begun)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
+        published = isinstance(self._recursion, PublishedRecursion)
+        limits = {"horizon": self.horizon, "max_facets": self.max_facets}
+        return {"kind": "polytope", **limits, "eps": self.eps, "as_published": published}
 
     def state_dict(self) -> dict[str, NDArray]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
@@ -173,7 +186,7 @@ class PolytopeObserver(RestartingPolytope):
         state: dict[str, NDArray] = {"settings": np.array([self.horizon, facets, self.eps, published])}
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state["restart"] = np.array([self._number, largest, self._readings is not None])
-        state |= write_set("initial", self._initial)
+        state |= self._form.state_dict() | write_set("initial", self._initial)
         if self._readings is not None:
             state |= {f"readings.{name}": value for name, value in self._readings.state().items()}
         if self._last is not None:
@@ -193,7 +206,9 @@ class PolytopeObserver(RestartingPolytope):
         try:
             horizon, facets, eps, published = (float(v) for v in state["settings"])
             limit = None if facets < 0 else int(facets)
-            observer = cls(model, read_set(state, "initial"), int(horizon), limit, eps, bool(published))
+            observer = cls.__new__(cls)
+            observer._configure(NormalForm.from_state_dict(model, state), int(horizon), limit, eps, bool(published))
+            observer._forget(read_set(state, "initial"))
             if "sample.stack" in state:
                 sample = read_sample(state, "sample")
                 if sample.stack.shape != model.stack(model.schedule).shape:
@@ -224,10 +239,12 @@ class PolytopeObserver(RestartingPolytope):
         return perf_counter() - begun
 
     def _sample(self, number: int, y: ArrayLike, u: Array, schedule: Any) -> Sample:
-        outputs, stack = outputs_of(self.model, y), stack_at(self.model, schedule)
-        lower, upper, noise = self.model.bounds(schedule)
-        disturbances = self._disturbances(lower, upper)
-        return Sample(number, stack, disturbances, noise, u, readable(outputs), (lower, upper))
+        """Model and data of a sample, in normal form."""
+        outputs, form = outputs_of(self.model, y), self._form
+        stack = stack_at(form.model, schedule)
+        lower, upper, noise = form.model.bounds(schedule)
+        disturbances, read = self._disturbances(lower, upper), readable(form.outputs(outputs))
+        return Sample(number, stack, disturbances, noise, form.inputs(u), read, (lower, upper))
 
 
 def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None:
@@ -240,7 +257,6 @@ def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None
         )
 
 
-def _check_initial(P: HPolytope, n: int) -> None:
-    check_first_states(P, n)
-    if not P.is_bounded():
-        raise ValueError("initial is unbounded; expected a bounded set of first states, such as a box")
+def _is_coupled(model: UncertainModel) -> bool:
+    """Whether w may enter the output."""
+    return may_be_nonzero(model.F, *(item.F for item in model.uncertainties))

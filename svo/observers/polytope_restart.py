@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope, UndecidedError
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm
 from svo.observers.free_start import Reading
+from svo.observers.given_units import polytope_proof_out
 from svo.observers.polytope_limits import FLOATS_TELL_APART, anywhere, cut_to, is_of_use, reach_ahead
 from svo.observers.polytope_sets import Outcome, Recursion, Sample
 from svo.observers.polytope_step import PolytopeCertificate, PolytopeStep
@@ -23,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class RestartingPolytope:
-    """Samples through a recursion of sets, however long the gaps between their measurements.
+    """Samples through a recursion of sets, in normal form, however long the gaps between their measurements.
 
     Attributes
     ----------
@@ -31,7 +33,8 @@ class RestartingPolytope:
         Sample at which the set last started from the model's largest set, if what is known now rests on it.
     """
 
-    model: UncertainModel
+    _form: NormalForm
+    _normal: UncertainModel
     horizon: int
     max_facets: int | None
     eps: float
@@ -50,10 +53,10 @@ class RestartingPolytope:
 
         The observer starts from the model's largest set, or is undecided until the readings alone bound the state.
         """
-        largest = self.model.start_range
+        largest = self._normal.start_range
         if largest is None:
             self._forget(self._initial)
-            self._readings = Readings(self.model, self.eps, self.horizon)
+            self._readings = Readings(self._normal, self.eps, self.horizon)
         else:
             self._forget(HPolytope.box(largest.lower, largest.upper))
             self.largest_at = 0
@@ -62,16 +65,15 @@ class RestartingPolytope:
         reason = None
         if isinstance(outcome.certificate, PolytopeCertificate):
             outcome = outcome._replace(certificate=replace(outcome.certificate, largest_at=self.largest_at))
-        if outcome.verdict != "falsified" and self.model.physical_range is not None:
-            joint, meets = cut_to(outcome.joint, self.model.physical_range, self.max_facets)
+        if outcome.verdict != "falsified" and self._normal.physical_range is not None:
+            joint, meets = cut_to(outcome.joint, self._normal.physical_range, self.max_facets)
             if not meets:  # not proven, so no alarm
                 outcome, reason = outcome._replace(verdict="undecided"), OUTSIDE
             outcome = outcome._replace(joint=joint)
         self._last, self._number = (sample, outcome), sample.number
-        return PolytopeStep(
-            sample.number, outcome.verdict, outcome.certificate, perf_counter() - begun, outcome.joint,
-            self.model.n_states, reason,
-        )  # fmt: skip
+        certificate = None if outcome.certificate is None else polytope_proof_out(outcome.certificate, self._form)
+        seconds = perf_counter() - begun
+        return PolytopeStep(sample.number, outcome.verdict, certificate, seconds, outcome.joint, self._form, reason)
 
     def _answer(self, u: Array, sample: Sample, y: ArrayLike, begun: float) -> PolytopeStep:
         """One sample, driven to by u, whose measurement as it was given is y."""
@@ -101,11 +103,11 @@ class RestartingPolytope:
             return self._keep(sample, last, begun)
         if not (is_of_use(before, u) and is_of_use(sample, sample.u)):
             return None
-        size = reach_ahead(self.model, before, last.joint, u)
+        size = reach_ahead(self._normal, before, last.joint, u)
         if not size < LARGEST:
             return None
         try:
-            maps = transitions(before.stack, self.model, u)
+            maps = transitions(before.stack, self._normal, u)
             return self._keep(sample, self._recursion.next(last, before, maps, sample), begun)
         except (UndecidedError, np.linalg.LinAlgError):
             if size < FLOATS_TELL_APART:
@@ -114,7 +116,7 @@ class RestartingPolytope:
 
     def _give_up(self, u: Array, sample: Sample, begun: float) -> PolytopeStep:
         """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
-        largest = self.model.start_range
+        largest = self._normal.start_range
         if largest is None:
             return self._lost(u, sample, begun)
         self._initial, self.largest_at = HPolytope.box(largest.lower, largest.upper), sample.number
@@ -122,27 +124,27 @@ class RestartingPolytope:
 
     def _lost(self, u: Array, sample: Sample, begun: float) -> PolytopeStep:
         self._last, self.largest_at = None, None
-        self._readings = Readings(self.model, self.eps, self.horizon)
+        self._readings = Readings(self._normal, self.eps, self.horizon)
         return self._without_set(u, sample, begun)
 
     def _without_set(self, u: Array, sample: Sample, begun: float) -> PolytopeStep:
         """A sample of an observer that has no set: it starts again once the readings alone bound the state."""
         assert self._readings is not None
         self._number = sample.number
-        slack = np.zeros(self.model.n_outputs)
+        slack = np.zeros(self._normal.n_outputs)
         self._readings.add(u, Reading(sample.stack, sample.u, sample.y, sample.noise, slack, *sample.w_box))
         found = self._readings.start()
         if found is not None:
             step = self._start_again(*found, begun)
             if step is not None:
                 return step
-        n, joint = self.model.n_states, anywhere(self.model.n_states, self.model.physical_range)
-        return PolytopeStep(sample.number, "undecided", None, perf_counter() - begun, joint, n, OUTGROWN)
+        joint = anywhere(self._normal.n_states, self._normal.physical_range)
+        return PolytopeStep(sample.number, "undecided", None, perf_counter() - begun, joint, self._form, OUTGROWN)
 
     def _start_again(self, samples: list[Reading], lower: Array, upper: Array, begun: float) -> PolytopeStep | None:
         """From bounds of the state at the first of some samples; None if a set does not come out of it."""
         number, readings = self._number, self._readings
-        physical = self.model.physical_range
+        physical = self._normal.physical_range
         if physical is not None:
             lower, upper, _ = physical.cut(lower, upper)
         self._readings, self._initial = None, HPolytope.box(lower, upper)
@@ -163,10 +165,10 @@ class RestartingPolytope:
         number, largest, lost = (int(v) for v in state["restart"])
         self._number, self.largest_at = number, None if largest == NO_SAMPLE else largest
         if lost:
-            self._readings = Readings(self.model, self.eps, self.horizon)
+            self._readings = Readings(self._normal, self.eps, self.horizon)
             prefix = "readings."
             self._readings.restore({k.removeprefix(prefix): state[k] for k in state if k.startswith(prefix)})
 
     def _disturbances(self, lower: Array, upper: Array) -> HPolytope | None:
-        polytope = self.model.disturbance_polytope
+        polytope = self._normal.disturbance_polytope
         return HPolytope.box(lower, upper) if polytope is None and lower.size else polytope

@@ -79,9 +79,7 @@ def _write_groups(name: str, groups: Iterable[Iterable[HPolytope]]) -> State:
 
 
 def _read_groups(state: Mapping[str, NDArray], name: str) -> tuple[tuple[HPolytope, ...], ...]:
-    return tuple(
-        tuple(read_set(state, f"{name}.{i}.{j}") for j in range(count)) for i, count in enumerate(state[name])
-    )
+    return tuple(tuple(read_set(state, f"{name}.{i}.{j}") for j in range(count)) for i, count in enumerate(state[name]))
 
 
 def _write_proof(name: str, proof: PolytopeCertificate) -> State:

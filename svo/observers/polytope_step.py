@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import Certificate, HPolytope
 from polytopes.exact import ZERO, rational
+from svo.normal_form import NormalForm, set_in
 from svo.observers.data import directions_of
 from svo.observers.readings import OUTGROWN
 from svo.observers.step import VerdictName
@@ -126,11 +127,6 @@ class PolytopeStep:
     verdict : {"consistent", "falsified", "undecided"}
     certificate : PolytopeCertificate, PublishedCertificate or None
     seconds : float
-    joint : HPolytope
-        Contains the state at this sample and, behind it, the disturbance w of the same sample where the output
-        depends on w.
-    n : int
-        Number of states.
     reason : str or None
         Why the verdict is "undecided", where that is known; see `svo.observers.step.Step`.
     """
@@ -139,27 +135,40 @@ class PolytopeStep:
     verdict: VerdictName
     certificate: AnyCertificate | None
     seconds: float
-    joint: HPolytope
-    n: int
+    _joint: HPolytope
+    _form: NormalForm
     reason: str | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return self._form.given.n_states
+
+    @property
+    def joint(self) -> HPolytope:
+        """Contains the state at this sample and, behind it, w of the same sample where the output depends on it."""
+        return set_in(self._joint, 1.0 / np.concatenate([self._form.x, self._form.w])[: self._joint.dim])
 
     @property
     def set(self) -> HPolytope:
         """Contains the state at this sample; empty once the model is falsified."""
         if self.verdict == "falsified":
             return HPolytope.empty(self.n)
-        return self.joint if self.joint.dim == self.n else self.joint.project(range(self.n))
+        states = self._joint if self._joint.dim == self.n else self._joint.project(range(self.n))
+        return set_in(states, 1.0 / self._form.x)
 
     @property
     def box(self) -> tuple[Array, Array]:
         """Bounds (lower, upper), each (n,), of the state at this sample; NaN once the model is falsified."""
         if self.verdict == "falsified":
             return np.full(self.n, np.nan), np.full(self.n, np.nan)
+        unit = self._form.x
         if self.reason == OUTGROWN:
-            return self.joint.bounding_box()
-        axes = np.eye(self.n, self.joint.dim)
-        ends = outer_support(self.joint, np.vstack([axes, -axes]))
-        return -ends[self.n :], ends[: self.n]
+            lower, upper = self._joint.bounding_box()
+            return lower * unit, upper * unit
+        axes = np.eye(self.n, self._joint.dim)
+        ends = outer_support(self._joint, np.vstack([axes, -axes]))
+        return -ends[self.n :] * unit, ends[: self.n] * unit
 
     def support(self, directions: ArrayLike) -> Array:
         """Outer bounds of d'x over the states at this sample, in any directions.
@@ -176,9 +185,10 @@ class PolytopeStep:
         rows = directions_of(directions, self.n)
         if self.verdict == "falsified":
             return np.full(len(rows), -np.inf)
+        normal = rows * self._form.x
         if self.reason == OUTGROWN:
-            return np.asarray(self.joint.support(rows), dtype=np.float64)
-        return outer_support(self.joint, np.hstack([rows, np.zeros((len(rows), self.joint.dim - self.n))]))
+            return np.asarray(self._joint.support(normal), dtype=np.float64)
+        return outer_support(self._joint, np.hstack([normal, np.zeros((len(rows), self._joint.dim - self.n))]))
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Why a window is empty: a Farkas certificate that checks in exact rational arithmetic (`svo.observers.weak_duality`).
 
 What a window proves is conditional on its arrival set and on the stated bounds of each channel's s; both are outer
-bounds that the observer computed before. An uncertainty enters as the sum of its channels, which is the model's
-own matrix but for the rounding of that factorisation (`weak_duality.FACTOR_TOLERANCE`, checked).
+bounds that the observer computed before. An uncertainty enters as the sum of its channels; what that leaves out of the
+model's own matrix is a disturbance with a bound, entry by entry (`svo.observers.left_out`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
+from svo.normal_form import Exponents, power
 from svo.observers.free_start import Reading, state_bounds
 from svo.observers.weak_duality import DualSum, NoProof, exact
 from svo.observers.window_kernel import BASE, TIME, Sizes
@@ -110,6 +111,9 @@ class WindowCertificate:
         Whether w and the channels of the last sample take part (they do where the output depends on them).
     largest_at : int or None
         Sample at which the observer's set started again from the model's largest set, a premise of the arrival set.
+    units : Exponents or None
+        Of the normal form in which uncertainties are factored into channels; None = the units as they are. A choice:
+        what any factors leave out is bounded.
     """
 
     first: int
@@ -125,6 +129,7 @@ class WindowCertificate:
     on_arrival: Array
     samples: tuple[WindowSample, ...]
     largest_at: int | None = None
+    units: Exponents | None = None
 
     def verify(self) -> bool:
         """Check the proof in exact rational arithmetic; True only if it proves that the window is empty.
@@ -174,11 +179,23 @@ def _with_known_start(c: WindowCertificate) -> Iterator[WindowCertificate]:
     if any(len(d) == 0 and s.stack[i].any() for i, d in zip(items, owned, strict=True) for s in c.samples):
         return  # nothing says how far its Delta goes
     delta = np.array([d[0] if len(d) else (0.0, 0.0) for d in owned]).reshape(-1, 2)
-    readings = [Reading(*(getattr(s, field) for field in Reading._fields)) for s in c.samples]
+    units = c.units or Exponents.zero(
+        c.n, *(np.size(v) for v in (c.samples[0].u, c.samples[0].y, c.samples[0].w_lower))
+    )
+    readings = [_normal_reading(s, units) for s in c.samples]
     for count in range(1, len(readings) + 1):
         found = state_bounds(readings[:count], delta, 0.0)
-        if found is not None and np.isfinite(found).all():
-            yield replace(c, arrival=ArrivalSet.box(*found))
+        if found is not None:
+            lower, upper = (end * power(units.states) for end in found)
+            if np.isfinite((lower, upper)).all():
+                yield replace(c, arrival=ArrivalSet.box(lower, upper))
+
+
+def _normal_reading(s: WindowSample, units: Exponents) -> Reading:
+    """Model and data of a sample in normal form, in which the choice of an inverse does not depend on units."""
+    u, y, w = (power(-e) for e in (units.inputs, units.outputs, units.disturbances))
+    ends = s.w_lower * w, s.w_upper * w
+    return Reading(s.stack * units.factor, s.u * u, s.y * y, s.noise * y, s.slack * y, *ends)
 
 
 def _is_well_formed(c: WindowCertificate) -> bool:
@@ -200,6 +217,8 @@ def _is_well_formed(c: WindowCertificate) -> bool:
     if not all(np.all(lower <= upper) for lower, upper in intervals) or any(np.isinf(s.y).any() for s in c.samples):
         return False
     if c.arrival.is_unknown and len(c.on_arrival):
+        return False
+    if c.units is not None and not c.units.are_usable:
         return False
     return bool(np.all((c.owner > 0) & (c.owner < len(c.samples[0].stack))))
 
@@ -228,6 +247,9 @@ def _expected_arrays(c: WindowCertificate) -> Iterator[tuple[Any, tuple[int, ...
     yield c.arrival.rows, (na, n), real, True
     yield from ((v, (na,), real, False) for v in (c.arrival.lower, c.arrival.upper))
     yield c.on_arrival, (na,), real, True
+    if c.units is not None:
+        sizes = (("states", n), ("inputs", nu), ("outputs", ny), ("disturbances", nw))
+        yield from ((getattr(c.units, name), (size,), np.int64, True) for name, size in sizes)
     for s in c.samples:
         yield s.stack, (np.size(head.stack) // (rows * columns), rows, columns), real, True
         yield s.u, (nu,), real, True

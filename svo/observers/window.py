@@ -13,18 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm
 from svo.observers import window_kernel as kernel
 from svo.observers.data import check_schedule, inputs_shaped, outputs_shaped, steps_of
+from svo.observers.given_units import arrival_in
 from svo.observers.proof import ArrivalSet
 from svo.observers.step import VerdictName
 from svo.observers.window_programs import ENTRY_ERRORS
 from svo.observers.window_restart import RestartingWindow
-from svo.observers.window_setup import (
-    finite_box,
-    joint_rows,
-    template_rows,
-    within,
-)
+from svo.observers.window_setup import first_states, template_rows
 from svo.observers.window_step import WindowRecord, WindowStep
 
 Array = NDArray[np.float64]
@@ -84,8 +81,11 @@ class WindowObserver(RestartingWindow):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
         if not isinstance(sign_split, int | np.integer) or sign_split < 0:
             raise ValueError(f"sign_split is {sign_split!r}; expected a number of cells >= 0 (0 = convex hulls)")
-        self._configure(model, horizon, template_rows(template, model.n_states), eps, int(sign_split))
-        self.reset(initial)
+        rows = template_rows(template, model.n_states)
+        first = first_states(initial, model)
+        form = NormalForm.at(model, first.box_lower, first.box_upper)
+        self._configure(form, horizon, rows * form.x, eps, int(sign_split))
+        self._begin_first(arrival_in(first, form))
 
     # -- the protocol ----------------------------------------------------------------------------
 
@@ -97,8 +97,7 @@ class WindowObserver(RestartingWindow):
         ValueError
             If the set is empty, unbounded or of the wrong dimension, or outside the model's physical range.
         """
-        lower, upper = finite_box(set, self.model.n_states)
-        self._begin_first(ArrivalSet(*within(self.model.physical_range, lower, upper), *joint_rows(set)))
+        self._begin_first(arrival_in(first_states(set, self.model), self._form))
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> WindowStep:
         """The first measurement, without a transition.
@@ -189,7 +188,7 @@ class WindowObserver(RestartingWindow):
         self.check_late(y, sample)
         if self._falsified is not None:
             return self._step("falsified", begun)
-        return self._step(self._take_late(outputs_shaped(self.model, y), sample), begun)
+        return self._step(self._take_late(self._form.outputs(outputs_shaped(self.model, y)), sample), begun)
 
     def check_late(self, y: ArrayLike, sample: int) -> None:
         """Raise what `late_update` would raise; nothing changes."""
@@ -221,8 +220,8 @@ class WindowObserver(RestartingWindow):
     @property
     def options(self) -> dict[str, Any]:
         """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
-        horizon, cells = self.horizon, self.sign_split
-        return {"kind": "window", "horizon": horizon, "template": self._template, "eps": self.eps, "sign_split": cells}
+        rows, horizon, cells = self._template / self._form.x, self.horizon, self.sign_split
+        return {"kind": "window", "horizon": horizon, "template": rows, "eps": self.eps, "sign_split": cells}
 
     def state_dict(self) -> dict[str, Array]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
@@ -231,7 +230,7 @@ class WindowObserver(RestartingWindow):
         last = dict(zip(("w_old_lower", "w_old_upper"), self._last_bounds or (), strict=False))
         falsified = np.array(float(self._falsified is not None))
         state = {"settings": settings, "falsified": falsified, "template": self._template, **first, **last}
-        state |= self._arrays | self._restart_state()
+        state |= self._form.state_dict() | self._arrays | self._restart_state()
         return {name: value.copy() for name, value in state.items()}
 
     @classmethod
@@ -247,7 +246,8 @@ class WindowObserver(RestartingWindow):
             horizon, steps, eps, cells = (float(v) for v in state["settings"])
             initial = ArrivalSet(**{f.name: np.array(state[f"initial.{f.name}"]) for f in fields(ArrivalSet)})
             observer = cls.__new__(cls)
-            observer._configure(model, None if horizon < 0 else int(horizon), state["template"], eps, int(cells))
+            form = NormalForm.from_state_dict(model, state)
+            observer._configure(form, None if horizon < 0 else int(horizon), state["template"], eps, int(cells))
             observer._begin_first(initial)
             observer._restore_restart(state, int(steps))
             for name, array in observer._arrays.items():
@@ -280,14 +280,14 @@ class WindowObserver(RestartingWindow):
         begun = perf_counter()
         other = WindowObserver.__new__(WindowObserver)
         other.__dict__.update(self.__dict__)
-        other.reset(HPolytope.box(self._initial.box_lower, self._initial.box_upper))
+        other._begin_first(self._initial)
         y, u = np.full(self.model.n_outputs, np.nan), np.zeros(self.model.n_inputs)
         schedule = self.model.schedule
         other.update(y, u, schedule)
         other.step(u, y, u, schedule).box  # noqa: B018
         other.step(u, y, u, schedule, deadline=0.0)
         other.late_update(y, 0)
-        kernel.channel_factors(self.model.stack(schedule), self._owner)
+        kernel.channel_factors(self._form.model.stack(schedule), self._owner, self._arrays["delta"])
         return perf_counter() - begun
 
     @property
@@ -298,13 +298,14 @@ class WindowObserver(RestartingWindow):
     @property
     def directions(self) -> Array:
         """Directions (nt, n) in which the arrival set and `WindowStep.set` are bounded: the axes, then the template."""
-        return self._arrays["T"].copy()
+        return np.vstack([np.eye(self.model.n_states), self._template / self._form.x])
 
     # -- inside ----------------------------------------------------------------------------------
 
     def _evaluate(self, schedule: Any) -> tuple[Array, tuple[Array, Array, Array]]:
+        """Matrices and bounds of a sample, in normal form."""
         check_schedule(self.model, schedule)
-        return self.model.stack(schedule), self.model.bounds(schedule)
+        return self._form.model.stack(schedule), self._form.model.bounds(schedule)
 
     def _sample(
         self,
@@ -318,8 +319,9 @@ class WindowObserver(RestartingWindow):
         begun: float,
         end: float | None = None,
     ) -> WindowStep:
-        w_old = self._last_bounds or w
-        data = (self._window, self._size, first, u, u_next, y, stack, noise, *w_old, *w)
+        w_old, form, self._reading = self._last_bounds or w, self._form, y
+        known = form.inputs(u), form.inputs(u_next), form.outputs(y)
+        data = (self._window, self._size, first, *known, stack, noise, *w_old, *w)
         verdict = self._answer(data, end)
         self._last_bounds = w
         return self._step(verdict, begun)
@@ -341,7 +343,9 @@ class WindowObserver(RestartingWindow):
         if self._falsified is not None:
             nothing = np.full(self._size.nt, np.nan)
             return nothing, nothing.copy()
-        return self._newest_bounds()
+        unit = np.append(self._form.x, np.ones(len(self._template)))
+        lower, upper = self._newest_bounds()
+        return lower * unit, upper * unit
 
     def _support_at(self, sample: int, directions: Array) -> Array:
         self._check_current(sample)
@@ -349,7 +353,7 @@ class WindowObserver(RestartingWindow):
             return np.full(len(directions), -np.inf)
         values = np.full(len(directions), np.inf)
         for i, direction in enumerate(directions if not self._lost else ()):
-            self._arrays["query"][:] = direction
+            self._arrays["query"][:] = direction * self._form.x
             self._solve(kernel.QUERY)
             values[i] = self._arrays["answer"][0]
         physical = self.model.physical_range

@@ -1,4 +1,5 @@
-"""A window in the kernel's memory: its sizes, its arrays, what the certificate of its multipliers is made of."""
+"""A window in the kernel's memory, in normal form: its sizes, its arrays, what the certificate of its multipliers is
+made of."""
 
 from __future__ import annotations
 
@@ -7,15 +8,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.model import UncertainModel
+from svo.normal_form import ENORMOUS, NormalForm
 from svo.observers import window_kernel as kernel
+from svo.observers.given_units import window_out
 from svo.observers.output_injection import OutputInjection, can_inject
 from svo.observers.proof import ArrivalSet, WindowCertificate, certificate_of
 from svo.observers.sign_split import SplitCertificate
 from svo.observers.window_setup import (
     channel_owners,
+    disturbance_rows,
     jitter,
-    joint_rows,
     needs_next_input,
     output_is_disturbed,
 )
@@ -27,7 +29,7 @@ _LARGEST_GROWING_BASIS = 256
 
 
 class WindowMemory:
-    """Arrays of a window, anchored at a set of first states, and what is fixed of its model.
+    """Arrays of a window, anchored at a set of first states, and what is fixed of its model; all in normal form.
 
     Attributes
     ----------
@@ -42,10 +44,8 @@ class WindowMemory:
 
     largest_at: int | None
 
-    def _configure(
-        self, model: UncertainModel, horizon: int | None, template: Array, eps: float, sign_split: int
-    ) -> None:
-        self.model = model
+    def _configure(self, form: NormalForm, horizon: int | None, template: Array, eps: float, sign_split: int) -> None:
+        self.model, self._form, self._normal, model = form.given, form, form.model, form.model
         self.sign_split = sign_split
         self.horizon = None if horizon is None else int(horizon)
         self.eps = float(eps)
@@ -69,17 +69,18 @@ class WindowMemory:
         """
         self._anchor, self._origin, self._free = anchor, origin, free
         self._allocate(steps)
-        n, w = self.model.n_states, self._arrays
+        n, w = self._normal.n_states, self._arrays
         w["h_lower"][:n], w["h_upper"][:n] = anchor.box_lower, anchor.box_upper
         kernel.initialise(self._window, self._size, anchor.rows, anchor.lower, anchor.upper)
         self._falsified: WindowCertificate | SplitCertificate | None = None
+        self._reading: Array | None = None  # the newest one, as it was given
         self._last_bounds: tuple[Array, Array] | None = None
 
     def _allocate(self, steps: int) -> None:
-        model, polytope = self.model, self.model.disturbance_polytope
+        model = self._form.model
         n = model.n_states
         nw = model.n_disturbances + (0 if self._injection is None else n)
-        w_rows = joint_rows(polytope) if polytope is not None else (np.zeros((0, nw)), np.zeros(0), np.zeros(0))
+        w_rows = disturbance_rows(self._form)
         nv, nr = nw + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
         na = max(len(self._template), len(self._anchor.rows))
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
@@ -94,7 +95,7 @@ class WindowMemory:
         w["T"][n:] = self._template
         w["owner"][:] = self._owner
         w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
-        w["w_rows"][:], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
+        w["w_rows"][:, : model.n_disturbances], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
         w["jitter"][:] = jitter(w["jitter"].size)
         self._window = kernel.new_window(dict(w))
         if self._injection is not None:
@@ -125,10 +126,16 @@ class WindowMemory:
     def _certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
         """Of the multipliers at hand, about the model and the data as given.
 
-        ``objective`` is a sample of the window, as the kernel counts, and a direction whose bound is to be proven.
+        ``objective`` is a sample of the window, as the kernel counts, and a direction, in normal form, whose bound is
+        to be proven.
         """
         if self._injection is not None:
             found = self._injection.certificate(self._arrays, self._size, self._arrival(), objective)
         else:
             found = certificate_of(self._arrays, self._size, self._arrival())
-        return replace(found, first=found.first + self._origin, last=found.last + self._origin)
+        found = replace(found, first=found.first + self._origin, last=found.last + self._origin)
+        given, beyond = window_out(found, self._form), np.abs(found.samples[-1].y) == ENORMOUS
+        if self._reading is None or not beyond.any():
+            return given
+        newest = replace(given.samples[-1], y=np.where(beyond, self._reading, given.samples[-1].y))
+        return replace(given, samples=(*given.samples[:-1], newest))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.normal_form import NormalForm
 from svo.observers import window_kernel as kernel
 from svo.observers.fallback import candidates, is_feasible
 from svo.observers.proof import ArrivalSet, WindowCertificate
@@ -31,8 +32,8 @@ class Outgrown(Exception):
     """The newest state has no bounds of use: the window is of no more use either."""
 
 
-def check_numbers(data: tuple[Any, ...]) -> None:
-    """What the kernel checks of the data of a sample."""
+def check_numbers(data: tuple[Any, ...], form: NormalForm) -> None:
+    """What the kernel checks of the data of a sample, which are in normal form."""
     u, u_next, y, stack = data[3:7]
     for code, holds in (
         (kernel.BAD_INPUT, np.isfinite(u).all() and np.isfinite(u_next).all()),
@@ -40,7 +41,7 @@ def check_numbers(data: tuple[Any, ...]) -> None:
         (kernel.BAD_MATRIX, np.isfinite(stack).all()),
     ):
         if not holds:
-            raise ValueError(ENTRY_ERRORS[code].format(u=u, y=y))
+            raise ValueError(ENTRY_ERRORS[code].format(u=u * form.u, y=y * form.y))
 
 
 class WindowPrograms(WindowMemory):
@@ -104,10 +105,9 @@ class WindowPrograms(WindowMemory):
         arrays["noise"][s] += widening
         arrays["given.slack"][s] = slack
 
-    @staticmethod
-    def _check_entry(code: int, data: tuple[Any, ...]) -> None:
+    def _check_entry(self, code: int, data: tuple[Any, ...]) -> None:
         if code in ENTRY_ERRORS:
-            raise ValueError(ENTRY_ERRORS[code].format(u=data[3], y=data[5]))
+            raise ValueError(ENTRY_ERRORS[code].format(u=data[3] * self._form.u, y=data[5] * self._form.y))
 
     def _settle_channels(self, sign_open: bool) -> None:
         """Tighten the bounds of those s whose sign is open."""

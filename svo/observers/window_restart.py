@@ -3,7 +3,7 @@
 After a long gap in the measurements the set outgrows `LARGEST` and says nothing any more. It is then given up. Where
 the model states the largest set it starts again there, a premise of every later alarm. Otherwise, and where the set
 is only so wide that its rounding blurs the readings, it starts again from the samples whose readings bound the state
-without anything before (`svo.observers.readings`): nothing is promised then.
+without anything before (`svo.observers.readings`): nothing is promised then. All in normal form.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class RestartingWindow(WindowPrograms):
         """Forget everything but a set of first states."""
         self._initial = initial
         self.largest_at, self._reason, self._lost, self._lost_at, self._readings = None, None, False, -1, None
-        self._missing = np.zeros(self.model.n_outputs, dtype=np.int64)
+        self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)
         self._begin(initial, self._first_steps)
 
     @property
@@ -53,7 +53,7 @@ class RestartingWindow(WindowPrograms):
     def _answer(self, data: tuple[Any, ...], end: float | None) -> VerdictName:
         """One sample. The observer is unchanged if it raises an error."""
         if self._lost:
-            check_numbers(data)
+            check_numbers(data, self._form)
             self._lost_at += 1
             return self._without_set(data)
         number = 0 if data[2] else self._number + 1
@@ -76,7 +76,7 @@ class RestartingWindow(WindowPrograms):
 
     def _cut_arrival(self, verdict: VerdictName) -> VerdictName:
         """The next arrival set, once it is known, within the physical range."""
-        physical, w, n = self.model.physical_range, self._arrays, self.model.n_states
+        physical, w, n = self._normal.physical_range, self._arrays, self._normal.n_states
         if physical is None or not w["clock"][kernel.PENDING] or verdict == "falsified":
             return verdict
         w["new_lower"][:n], w["new_upper"][:n], meets = physical.cut(w["new_lower"][:n], w["new_upper"][:n])
@@ -120,7 +120,7 @@ class RestartingWindow(WindowPrograms):
 
     def _give_up(self, data: tuple[Any, ...], number: int) -> VerdictName:
         """The set has outgrown all bounds at this sample."""
-        largest = self.model.start_range
+        largest = self._normal.start_range
         if largest is not None:
             self._start(ArrivalSet.box(largest.lower, largest.upper), number)
             self.largest_at = number
@@ -137,7 +137,7 @@ class RestartingWindow(WindowPrograms):
 
         The observer starts from the model's largest set, or is undecided until the readings alone bound the state.
         """
-        largest = self.model.start_range
+        largest = self._normal.start_range
         if largest is None:
             self._lose(-1)
         else:
@@ -147,7 +147,7 @@ class RestartingWindow(WindowPrograms):
     def _lose(self, number: int) -> None:
         """There is no set any more; ``number`` is that of the newest sample."""
         self.largest_at, self._lost, self._lost_at = None, True, number
-        self._readings = Readings(self.model, self.eps, self.horizon or 0)
+        self._readings = Readings(self._normal, self.eps, self.horizon or 0)
         self._begin(self._anchor, self._first_steps)
 
     def _without_set(self, data: tuple[Any, ...]) -> VerdictName:
@@ -173,7 +173,7 @@ class RestartingWindow(WindowPrograms):
             self._missing = np.where(absent, self._missing + 1, 0)
             if not (returned.any() and self._is_blurred(returned, data)):
                 return verdict
-            self._readings = Readings(self.model, self.eps, self.horizon or 0)
+            self._readings = Readings(self._normal, self.eps, self.horizon or 0)
         self._readings.add(data[3], _reading_of(data))
         better = self._start_from_readings()
         if better is not None:
@@ -185,7 +185,7 @@ class RestartingWindow(WindowPrograms):
     def _is_blurred(self, returned: NDArray[np.bool_], data: tuple[Any, ...]) -> bool:
         """Whether the slack of a sensor's row comes from the width of the set more than it should."""
         y, stack, noise = data[5:8]
-        s, n = self._time % (self._size.N + 1), self.model.n_states
+        s, n = self._time % (self._size.N + 1), self._normal.n_states
         width = self._arrays["mag"][s] - np.abs(self._arrays["phi"][s])
         blur = self.eps * np.abs(stack[0, n:, :n]) @ np.maximum(width, 0.0)
         own = noise + self.eps * np.abs(np.nan_to_num(y))
@@ -201,7 +201,7 @@ class RestartingWindow(WindowPrograms):
             return None
         samples, lower, upper = found
         number, kept = self._number, self.__dict__.copy()
-        physical = self.model.physical_range
+        physical = self._normal.physical_range
         if physical is not None:
             lower, upper, _ = physical.cut(lower, upper)
         self._start(ArrivalSet.box(lower, upper), number - len(samples) + 1, free=True)
@@ -217,7 +217,7 @@ class RestartingWindow(WindowPrograms):
     def _start(self, arrival: ArrivalSet, number: int, free: bool = False) -> None:
         """A new window whose first sample has this number."""
         self._lost, self._readings, self._reason, self.largest_at = False, None, None, None
-        self._missing = np.zeros(self.model.n_outputs, dtype=np.int64)
+        self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)
         self._begin(arrival, self._first_steps, number, free)
 
     def _repeat(self, samples: list[Reading]) -> VerdictName:
@@ -244,12 +244,12 @@ class RestartingWindow(WindowPrograms):
         self.__dict__.update(kept)
         old = self._newest_bounds()
         self.__dict__.update(new)
-        n = self.model.n_states
+        n = self._normal.n_states
         return bool((found[1] - found[0] <= old[1] - old[0])[:n].all())
 
     def _newest_bounds(self) -> tuple[Array, Array]:
         """Bounds of the newest state in the template's directions, within the physical range; the axes come first."""
-        physical, rows = self.model.physical_range, self._arrays["T"]
+        physical, rows = self._normal.physical_range, self._arrays["T"]
         if self._lost:
             lower, upper = np.full(len(rows), -np.inf), np.full(len(rows), np.inf)
         else:
@@ -281,7 +281,7 @@ class RestartingWindow(WindowPrograms):
         self.largest_at = None if largest == NO_SAMPLE else largest
         self._missing = np.array(state["missing"], dtype=np.int64)
         if has_readings:
-            self._readings = Readings(self.model, self.eps, self.horizon or 0)
+            self._readings = Readings(self._normal, self.eps, self.horizon or 0)
             prefix = "readings."
             self._readings.restore({k.removeprefix(prefix): state[k] for k in state if k.startswith(prefix)})
 

@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm
+from svo.observers.proof import ArrivalSet
+from svo.observers.window_kernel import channel_count
 from svo.state_range import StateRange
 
 Array = NDArray[np.float64]
@@ -33,9 +36,9 @@ def template_rows(template: str | ArrayLike, n: int) -> Array:
 
 
 def channel_owners(model: UncertainModel) -> NDArray[np.int64]:
-    """For each channel, the item of the stack that it belongs to."""
+    """For each channel of a model in normal form, the item of the stack that it belongs to."""
     stack = model.stack(model.schedule)
-    owners = [item for item in range(1, len(stack)) for _ in range(int(np.linalg.matrix_rank(stack[item], rtol=1e-12)))]
+    owners = [item for item in range(1, len(stack)) for _ in range(channel_count(stack[item]))]
     return np.array(owners, dtype=np.int64)
 
 
@@ -67,6 +70,15 @@ def joint_rows(P: HPolytope) -> tuple[Array, Array, Array]:
     return rows[joint], lower[joint], upper[joint]
 
 
+def disturbance_rows(form: NormalForm) -> tuple[Array, Array, Array]:
+    """Rows on several disturbances, in normal form, with their bounds as they are given."""
+    polytope = form.given.disturbance_polytope
+    if polytope is None:
+        return np.zeros((0, form.given.n_disturbances)), np.zeros(0), np.zeros(0)
+    rows, lower, upper = joint_rows(polytope)
+    return rows * form.w, lower, upper
+
+
 def check_first_states(P: HPolytope, n: int) -> None:
     """Raise an error unless a set of first states is one, of n states, and not empty."""
     if not isinstance(P, HPolytope):
@@ -85,6 +97,11 @@ def within(physical: StateRange | None, lower: Array, upper: Array) -> tuple[Arr
     if not meets:
         raise ValueError("initial and the model's physical range have no common point; expected first states within it")
     return lower, upper
+
+
+def first_states(P: HPolytope, model: UncertainModel) -> ArrivalSet:
+    """A set of first states of a model: its box, within the physical range, and its rows on several states."""
+    return ArrivalSet(*within(model.physical_range, *finite_box(P, model.n_states)), *joint_rows(P))
 
 
 def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:

@@ -13,14 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm
 from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.free_start import Reading
+from svo.observers.given_units import arrival_in
 from svo.observers.proof import WindowSample
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
 from svo.observers.step import VerdictName
 from svo.observers.window_kernel import LARGEST
-from svo.observers.window_setup import needs_next_input
+from svo.observers.window_setup import first_states, needs_next_input
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate
 from svo.observers.zonotope_reduction import reduced
@@ -72,19 +74,20 @@ class ConstrainedZonotopeObserver:
             raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
         if not (np.isfinite(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        self._configure(model, max_generators, max_constraints, eps)
-        self.reset(initial)
-
-    def _configure(
-        self, model: UncertainModel, max_generators: int | None, max_constraints: int | None, eps: float
-    ) -> None:
         n = model.n_states
-        self.model = model
+        generators = _limit("max_generators", max_generators, 8 * n, n)
+        constraints = _limit("max_constraints", max_constraints, 3 * n, 0)
+        first = first_states(initial, model)
+        form = NormalForm.at(model, first.box_lower, first.box_upper)
+        self._configure(form, generators, constraints, eps)
+        self._forget(self._builder.first_set(arrival_in(first, form)))
+
+    def _configure(self, form: NormalForm, max_generators: int, max_constraints: int, eps: float) -> None:
+        self.model, self._form, self._normal = form.given, form, form.model
         self.eps = float(eps)
-        self.max_generators = _limit("max_generators", max_generators, 8 * n, n)
-        self.max_constraints = _limit("max_constraints", max_constraints, 3 * n, 0)
-        self._builder = StageBuilder(model, self.eps)
-        self._wants_next_input = needs_next_input(model)
+        self.max_generators, self.max_constraints = max_generators, max_constraints
+        self._builder = StageBuilder(form, self.eps)
+        self._wants_next_input = needs_next_input(self.model)
 
     # -- the protocol ----------------------------------------------------------------------------
 
@@ -96,7 +99,10 @@ class ConstrainedZonotopeObserver:
         ValueError
             If the set is empty, unbounded or of the wrong dimension, or outside the model's physical range.
         """
-        self._first = self._builder.first_set(set)
+        self._forget(self._builder.first_set(arrival_in(first_states(set, self.model), self._form)))
+
+    def _forget(self, first: ConstrainedZonotope) -> None:
+        self._first = first
         self._number = -1
         self._stages: tuple[Stage, ...] = ()  # the last one goes on to the next sample
         self._falsified: ZonotopeCertificate | None = None
@@ -110,9 +116,9 @@ class ConstrainedZonotopeObserver:
         """
         self._number, self._stages, self._falsified = -1, (), None
         self._readings, self.largest_at = None, None
-        largest = self.model.start_range
+        largest = self._normal.start_range
         if largest is None:
-            self._readings = Readings(self.model, self.eps)
+            self._readings = Readings(self._normal, self.eps)
         else:
             self._first, self.largest_at = ConstrainedZonotope.box(largest.lower, largest.upper), 0
 
@@ -134,7 +140,7 @@ class ConstrainedZonotopeObserver:
         inputs = inputs_of(self.model, "u", u, self._wants_next_input)
         data = self._data(inputs, outputs_of(self.model, y0), schedule)
         if self._readings is not None:
-            return self._without_set(inputs, data, begun)
+            return self._without_set(data.u, data, begun)
         return self._begin(data, begun)
 
     def step(
@@ -168,9 +174,10 @@ class ConstrainedZonotopeObserver:
         data = self._data(following, outputs, schedule)
         if self._number < 0:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
+        u = self._form.inputs(inputs)
         if self._readings is not None:
-            return self._without_set(inputs, data, begun)
-        return self._go_on(inputs, data, begun) or self._give_up(inputs, data, begun)
+            return self._without_set(u, data, begun)
+        return self._go_on(u, data, begun) or self._give_up(u, data, begun)
 
     def run(self, log: Log) -> ZonotopeRecord:
         """All samples of a log, with the box of the state at each."""
@@ -207,7 +214,7 @@ class ConstrainedZonotopeObserver:
         settings = [self._number, falsified, self.max_generators, self.max_constraints, self.eps]
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state = {"settings": np.array(settings), "restart": np.array([largest, self._readings is not None])}
-        state |= _named("first", self._first)
+        state |= _named("first", self._first) | self._form.state_dict()
         if self._readings is not None:
             state |= {f"readings.{name}": value for name, value in self._readings.state().items()}
         for i, stage in enumerate(self._stages):
@@ -227,7 +234,7 @@ class ConstrainedZonotopeObserver:
         try:
             number, falsified, generators, constraints, eps = (float(v) for v in state["settings"])
             observer = cls.__new__(cls)
-            observer._configure(model, int(generators), int(constraints), eps)
+            observer._configure(NormalForm.from_state_dict(model, state), int(generators), int(constraints), eps)
             observer._first = _read(state, "first")
             observer._restore(int(number), bool(falsified), state)
         except (KeyError, IndexError, TypeError, ValueError) as error:
@@ -253,14 +260,14 @@ class ConstrainedZonotopeObserver:
 
     def _give_up(self, u: Array, data: WindowSample, begun: float) -> ZonotopeStep:
         """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
-        largest = self.model.start_range
+        largest = self._normal.start_range
         if largest is None:
             return self._lost(u, data, begun)
         self._first, self.largest_at = ConstrainedZonotope.box(largest.lower, largest.upper), self._number + 1
         return self._begin(data, begun)
 
     def _lost(self, u: Array, data: WindowSample, begun: float) -> ZonotopeStep:
-        self._stages, self.largest_at, self._readings = (), None, Readings(self.model, self.eps)
+        self._stages, self.largest_at, self._readings = (), None, Readings(self._normal, self.eps)
         return self._without_set(u, data, begun)
 
     def _without_set(self, u: Array, data: WindowSample, begun: float) -> ZonotopeStep:
@@ -274,7 +281,7 @@ class ConstrainedZonotopeObserver:
     def _start_again(self, samples: list[Reading], lower: Array, upper: Array, begun: float) -> ZonotopeStep | None:
         """From bounds of the state at the first of some samples; None if a set does not come out of it."""
         number, readings = self._number, self._readings
-        physical = self.model.physical_range
+        physical = self._normal.physical_range
         if physical is not None:
             lower, upper, _ = physical.cut(lower, upper)
         self._number, self._readings = number - len(samples), None
@@ -292,7 +299,9 @@ class ConstrainedZonotopeObserver:
     # -- inside ------------------------------------------------------------------------------------
 
     def _data(self, u: Array, y: Array, schedule: Any) -> WindowSample:
-        return self._builder.data(stack_at(self.model, schedule), self.model.bounds(schedule), u, y)
+        """Model and data of a sample, in normal form."""
+        form, model = self._form, self._normal
+        return self._builder.data(stack_at(model, schedule), model.bounds(schedule), form.inputs(u), form.outputs(y))
 
     def _conclude(
         self, before: tuple[Stage, ...], now: Stage, states: ConstrainedZonotope | None, begun: float
@@ -306,8 +315,9 @@ class ConstrainedZonotopeObserver:
             self._stages = (now,)
         else:
             arrival = reduced(states, self.max_generators, self.max_constraints)
-            if self.model.physical_range is not None:
-                arrival = arrival.cut_to(self.model.physical_range.lower, self.model.physical_range.upper)
+            physical = self._normal.physical_range
+            if physical is not None:
+                arrival = arrival.cut_to(physical.lower, physical.upper)
             self._stages = (self._builder.measured(arrival, now.data),)
         return self._answer(verdict, now, begun)
 
@@ -326,10 +336,9 @@ class ConstrainedZonotopeObserver:
         return "undecided"
 
     def _answer(self, verdict: VerdictName, now: Stage | None, begun: float) -> ZonotopeStep:
-        return ZonotopeStep(
-            self._number, verdict, self._falsified, perf_counter() - begun, None if now is None else now.joint,
-            self.model.n_states, None if now is not None else OUTGROWN, self.model.physical_range,
-        )  # fmt: skip
+        joint, reason = (None, OUTGROWN) if now is None else (now.joint, None)
+        seconds = perf_counter() - begun
+        return ZonotopeStep(self._number, verdict, self._falsified, seconds, joint, self._form, reason)
 
     def _restore(self, number: int, falsified: bool, state: Mapping[str, Array]) -> None:
         """The stages, made again from their arrival sets and data as they were made first."""

@@ -1,5 +1,7 @@
 """One sample of the constrained-zonotope observer: what w, the channels and a measurement add to the set of the state.
 
+All in normal form, but for the certificates.
+
 An uncertainty enters as p = Delta s over the bounds [l, r] of s: the two lines of `WindowObserver`, as constraints over
 a generator of p. The same w and p enter the next state and the output.
 """
@@ -11,17 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes import HPolytope
-from svo.model import UncertainModel
+from svo.normal_form import NormalForm
 from svo.observers.constrained_zonotope import EPS, ConstrainedZonotope, unit
+from svo.observers.given_units import zonotope_proof_out
 from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
 from svo.observers.window_kernel import channel_factors
-from svo.observers.window_setup import channel_owners, finite_box, joint_rows, output_is_disturbed, within
+from svo.observers.window_setup import channel_owners, disturbance_rows, output_is_disturbed
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate, proven_support, rounded_up
 
 Array = NDArray[np.float64]
-_FACTORS = 1e-12  # relative: what the channels of an uncertainty may leave out of its matrices
 NO_ROW = -1
 
 
@@ -38,6 +39,8 @@ class Stage:
     data : WindowSample
         Multipliers are zero.
     gains, functionals : (nq, n + ny), (nq, n + nu + 1 + nw) arrays
+    left : (n + ny, n + nu + 1 + nw) array
+        Bound of what the channels leave out of the uncertainties.
     on_output, on_w : (ny,), (nh,) arrays of int
         Constraints of ``joint`` that are the rows of the outputs and of w; -1 where there is none.
     on_p : tuple of int
@@ -51,6 +54,7 @@ class Stage:
     data: WindowSample
     gains: Array
     functionals: Array
+    left: Array
     on_output: NDArray[np.int64]
     on_w: NDArray[np.int64]
     on_p: tuple[int, ...] = ()
@@ -62,26 +66,24 @@ class StageBuilder:
 
     Attributes
     ----------
+    form : NormalForm
     model : UncertainModel
+        That of the normal form.
     is_late : bool
         Whether the output depends on w or a channel, so that both enter before the measurement.
     """
 
-    def __init__(self, model: UncertainModel, eps: float) -> None:
-        self.model, self.eps = model, eps
+    def __init__(self, form: NormalForm, eps: float) -> None:
+        self.form, self.model, self.eps = form, form.model, eps
+        model = form.model
         self.is_late = output_is_disturbed(model)
         self._owner = channel_owners(model)
         self._delta = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
-        polytope = model.disturbance_polytope
-        nothing = np.zeros(0)
-        self._w_rows = (np.zeros((0, model.n_disturbances)), nothing, nothing)
-        if polytope is not None:
-            self._w_rows = joint_rows(polytope)
+        self._w_rows = disturbance_rows(form)
 
-    def first_set(self, initial: HPolytope) -> ConstrainedZonotope:
-        """The set of first states; ValueError if it is empty, unbounded or of the wrong dimension."""
-        lower, upper = within(self.model.physical_range, *finite_box(initial, self.model.n_states))
-        return ConstrainedZonotope.box(lower, upper).cut(*joint_rows(initial))
+    def first_set(self, first: ArrivalSet) -> ConstrainedZonotope:
+        """The set of first states."""
+        return ConstrainedZonotope.box(first.box_lower, first.box_upper).cut(first.rows, first.lower, first.upper)
 
     def data(self, stack: Array, bounds: tuple[Array, Array, Array], u: Array, y: Array) -> WindowSample:
         """What is known of a sample before the set is."""
@@ -95,14 +97,11 @@ class StageBuilder:
 
     def measured(self, states: ConstrainedZonotope, data: WindowSample) -> Stage:
         """A set of states and the measurement of its sample."""
-        gains, functionals = channel_factors(data.stack, self._owner)
-        for item in range(1, len(data.stack)):
-            mine = self._owner == item
-            left = np.abs(data.stack[item] - gains[mine].T @ functionals[mine]).max()
-            if not left <= _FACTORS * np.abs(data.stack[item]).max():
-                raise ValueError("an uncertainty has a higher rank at this sample than at the model's typical schedule")
+        gains, functionals, left, complete = channel_factors(data.stack, self._owner, self._delta)
+        if not complete:
+            raise ValueError("an uncertainty has a higher rank at this sample than at the model's typical schedule")
         nowhere = np.full(self.model.n_outputs, NO_ROW)
-        stage = Stage(states, states, data, gains, functionals, nowhere, np.full(len(data.on_w), NO_ROW))
+        stage = Stage(states, states, data, gains, functionals, left, nowhere, np.full(len(data.on_w), NO_ROW))
         return self._measure(self.opened(stage, data.u) if self.is_late else stage)
 
     def opened(self, stage: Stage, u: Array) -> Stage:
@@ -143,7 +142,7 @@ class StageBuilder:
         M = np.hstack([stage.data.stack[0, :n][:, self._columns()], stage.gains[:, :n].T])
         known = self._known(stage.data.stack[0, :n], u)
         size = self._known(np.abs(stage.data.stack[0, :n]), np.abs(u))
-        return stage, stage.joint.affine_map(M, known).grown(unit(len(u)) * size)
+        return stage, stage.joint.affine_map(M, known).grown(unit(len(u)) * size + self._left_out(stage, slice(0, n)))
 
     def certificate(self, stages: tuple[Stage, ...], multipliers: Array, last: int) -> ZonotopeCertificate | None:
         """The certificate that multipliers of the last stage's constraints amount to; None if it proves nothing."""
@@ -170,7 +169,7 @@ class StageBuilder:
             w_rows=self._w_rows[0], w_rows_lower=self._w_rows[1], w_rows_upper=self._w_rows[2],
             arrival=_half_space(arrival, -costate, on_arrival), on_arrival=np.ones(1), samples=tuple(samples[::-1]),
         )  # fmt: skip
-        certificate = ZonotopeCertificate(arrival, on_arrival, window)
+        certificate = zonotope_proof_out(ZonotopeCertificate(arrival, on_arrival, window), self.form)
         return certificate if certificate.verify() else None
 
     # -- inside ------------------------------------------------------------------------------------
@@ -184,6 +183,17 @@ class StageBuilder:
         """What the input and the constant contribute to rows over (x, u, 1, w)."""
         n, nu = self.model.n_states, self.model.n_inputs
         return rows[:, n : n + nu] @ u + rows[:, n + nu]
+
+    def _left_out(self, stage: Stage, rows: slice) -> Array:
+        """Bound of what the channels leave out of rows of [x(k+1); y(k)]."""
+        left = stage.left[rows]
+        if not left.any():
+            return np.zeros(len(left))
+        lower, upper = stage.joint.interval_hull()
+        reach, n = np.maximum(np.abs(lower), np.abs(upper)), self.model.n_states
+        w = reach[n : n + self.model.n_disturbances]
+        total = left @ np.concatenate([reach[:n], np.abs(stage.data.u), [1.0], w])
+        return total * (1.0 + unit(left.shape[1]))
 
     def _with_channel(
         self,
@@ -229,6 +239,8 @@ class StageBuilder:
         slack[np.isnan(data.y)] = 0.0
         rounding = unit(len(data.u)) * (np.abs(data.y) + size)
         width = data.noise + slack + rounding
+        if stage.is_open:
+            width += self._left_out(stage, slice(n, None))
         joint = stage.joint.cut(rows[chosen], (data.y - known - width)[chosen], (data.y - known + width)[chosen])
         on_output = stage.on_output.copy()
         on_output[chosen] = np.arange(len(stage.joint.offset), len(joint.offset))

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.normal_form import NormalForm
 from svo.observers.constrained_zonotope import ConstrainedZonotope
 from svo.observers.data import directions_of
+from svo.observers.given_units import zonotope_out
 from svo.observers.step import VerdictName
 from svo.observers.zonotope_program import ZonotopeProgram
 from svo.observers.zonotope_proof import ZonotopeCertificate
-from svo.state_range import StateRange
 
 Array = NDArray[np.float64]
 
@@ -28,25 +29,36 @@ class ZonotopeStep:
     verdict : {"consistent", "falsified", "undecided"}
     certificate : ZonotopeCertificate or None
     seconds : float
-    joint : ConstrainedZonotope or None
-        Contains the state at this sample and, behind it, w and the channels where the output depends on them. None
-        while the set is outgrown.
-    n : int
-        Number of states.
     reason : str or None
-    physical : StateRange or None
-        The range that the model promises; box, set and support are cut to it.
+        Why the verdict is "undecided", where that is known; see `svo.observers.step.Step`.
+
+    Box, set and support are cut to the range of states that the model promises.
     """
 
     sample: int
     verdict: VerdictName
     certificate: ZonotopeCertificate | None
     seconds: float
-    joint: ConstrainedZonotope | None
-    n: int
+    _joint: ConstrainedZonotope | None
+    _form: NormalForm
     reason: str | None = None
-    physical: StateRange | None = None
     _bounds: list[tuple[Array, Array]] = field(default_factory=list, repr=False)
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return self._form.given.n_states
+
+    @property
+    def joint(self) -> ConstrainedZonotope | None:
+        """Contains the state at this sample and, behind it, w and the channels where the output depends on them.
+
+        None while the set is outgrown.
+        """
+        if self._joint is None:
+            return None
+        unit = np.concatenate([self._form.x, self._form.w, np.ones(self._joint.dim)])[: self._joint.dim]
+        return zonotope_out(self._joint, unit)
 
     @property
     def box(self) -> tuple[Array, Array]:
@@ -57,8 +69,9 @@ class ZonotopeStep:
             axes = np.eye(self.n)
             ends = self._support(np.vstack([axes, -axes]))
             lower, upper = -ends[self.n :], ends[: self.n]
-            if self.physical is not None:
-                lower, upper, _ = self.physical.cut(lower, upper)
+            physical = self._form.given.physical_range
+            if physical is not None:
+                lower, upper, _ = physical.cut(lower, upper)
             self._bounds.append((lower, upper))
         lower, upper = self._bounds[0]
         return lower.copy(), upper.copy()
@@ -88,14 +101,14 @@ class ZonotopeStep:
         rows = directions_of(directions, self.n)
         if self.verdict == "falsified":
             return np.full(len(rows), -np.inf)
-        values = self._support(rows)
-        return values if self.physical is None else np.minimum(values, self.physical.support(rows))
+        values, physical = self._support(rows), self._form.given.physical_range
+        return values if physical is None else np.minimum(values, physical.support(rows))
 
     def _support(self, rows: Array) -> Array:
-        if self.joint is None:
+        if self._joint is None:
             return np.full(len(rows), np.inf)
-        wide = np.hstack([rows, np.zeros((len(rows), self.joint.dim - self.n))])
-        return ZonotopeProgram(self.joint).support(wide)
+        wide = np.hstack([rows * self._form.x, np.zeros((len(rows), self._joint.dim - self.n))])
+        return ZonotopeProgram(self._joint).support(wide)
 
 
 @dataclass(frozen=True, eq=False)

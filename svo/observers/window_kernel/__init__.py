@@ -1,12 +1,13 @@
 """Compiled kernel of the moving-horizon window; `svo.observers.window` drives it, nothing else should.
 
 memory        every array of a window, and its compiled type
+factors      an uncertainty as a sum of channels, and what that leaves out
 rows, channels, motion      the window's rows, its channels of uncertainty, and how it slides
 basis, ratio_test, dual_simplex      the bounded dual simplex
 programs, sample, older_rows      what Python calls: the programs of a window, one sample of data, rows added later
 """
 
-from svo.observers.window_kernel.channels import channel_factors
+from svo.observers.window_kernel.factors import channel_count, channel_factors
 from svo.observers.window_kernel.memory import (
     BASE,
     CONSISTENT,
@@ -71,6 +72,7 @@ __all__ = [
     "add_late",
     "allocate",
     "arrival_programs",
+    "channel_count",
     "channel_factors",
     "complete",
     "enter",

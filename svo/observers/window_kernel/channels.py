@@ -5,81 +5,10 @@ The lines are exact where s keeps one sign, and the exact convex hull over [l, r
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from svo.observers.window_kernel.memory import UNIT
 from svo.observers.window_kernel.rows import clear_row, midpoint, set_row
-from svo.observers.window_kernel.short_rows import copy, fill
-from svo.observers.window_kernel.sources import SOURCES
-
-
-@njit(error_model="numpy")
-def _pivot_of(rest):
-    best, r, c = -1.0, 0, 0
-    for i in range(rest.shape[0]):
-        for j in range(rest.shape[1]):
-            if abs(rest[i, j]) > best:
-                best, r, c = abs(rest[i, j]), i, j
-    return r, c
-
-
-@njit(error_model="numpy")
-def _peel(rest, r, c, gain, functional):
-    """Subtract gain functional' and clear the pivot's row and column, which it cancels exactly."""
-    for i in range(rest.shape[0]):
-        for j in range(rest.shape[1]):
-            rest[i, j] = 0.0 if i == r or j == c else rest[i, j] - gain[i] * functional[j]
-
-
-@njit(error_model="numpy")
-def _factor(stacked, gain, functional):
-    """Write a matrix as a sum of gain functional', one term a row of the two; returns what is left over, relatively."""
-    rest = stacked.copy()
-    r, c = _pivot_of(rest)
-    largest = abs(rest[r, c])
-    for q in range(gain.shape[0]):
-        fill(gain[q], 0.0)
-        fill(functional[q], 0.0)
-        if abs(rest[r, c]) > 1e-13 * largest:
-            for a in range(rest.shape[0]):
-                gain[q, a] = rest[a, c] / rest[r, c]
-            copy(functional[q], rest[r])
-            _peel(rest, r, c, gain[q], functional[q])
-            r, c = _pivot_of(rest)
-    return abs(rest[r, c]) / largest if largest > 0.0 else 0.0
-
-
-def _compile_factor_all(sources):
-    @njit(cache=True, error_model="numpy")
-    def factor_all(stack, owner, gain, functional):
-        """Channels of every uncertainty of a stack; False if one has more rank than channels."""
-        sources  # noqa: B018 - in the closure, so part of the cache's key
-        for item in range(1, stack.shape[0]):
-            if not np.any(owner == item) and np.any(stack[item]):
-                return False
-        q = 0
-        while q < owner.shape[0]:
-            last = q
-            while last < owner.shape[0] and owner[last] == owner[q]:
-                last += 1
-            if _factor(stack[owner[q]], gain[q:last], functional[q:last]) > 1e-12:
-                return False
-            q = last
-        return True
-
-    return factor_all
-
-
-factor_all = _compile_factor_all(SOURCES)
-
-
-def channel_factors(stack, owner):
-    """Gains (nq, n + ny) and functionals (nq, n + nu + 1 + nw) of the channels, as the window uses them."""
-    gain = np.zeros((len(owner), stack.shape[1]))
-    functional = np.zeros((len(owner), stack.shape[2]))
-    factor_all(stack, owner, gain, functional)
-    return gain, functional
 
 
 @njit(error_model="numpy")

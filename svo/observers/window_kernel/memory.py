@@ -19,6 +19,7 @@ from numba.extending import intrinsic
 
 FAST = {"nnan", "nsz", "reassoc", "contract"}
 UNIT = 1.1102230246251565e-16  # unit roundoff
+FLOOR = 2.0**-900  # in normal form: more than underflow can lose
 FEASIBILITY = 1e-9  # violation of a scaled row or variable that counts as none
 GAP = 1e-9  # between bound and optimum, as a share of the largest cost, that is not worth another factorisation
 SMALL_PIVOT = 1e-6
@@ -62,9 +63,10 @@ FLOATS = {
     "query": "n", "answer": "1",
     # data as given, for proofs
     "stack": "SiXP", "u": "Su", "y": "Sy", "noise": "Sy", "slack": "Sy", "w_lower": "Vw", "w_upper": "Vw",
-    # channels: stacked uncertainty = gain functional', what was known of s, and the two lines over s that bound p
+    # channels: stacked uncertainties = gain functional' but for `left`, a bound of the rest times |Delta|, and whether
+    # that is not zero; what was known of s, and the two lines over s that bound p
     # (slope, intercept; above, then below)
-    "gain": "VqX", "functional": "VqP", "s_lower": "Vq", "s_upper": "Vq", "lines": "Vq4",
+    "gain": "VqX", "functional": "VqP", "left": "VXP", "is_left": "V", "s_lower": "Vq", "s_upper": "Vq", "lines": "Vq4",
     # fixed: Delta bounds of the channels, rows on w
     "delta": "q2", "w_rows": "hw", "w_rows_lower": "h", "w_rows_upper": "h",
     # one basis inverse a direction; multipliers of an empty window

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from svo.observers.window_kernel.memory import BASE, PENDING, TIME, UNIT
+from svo.observers.window_kernel.factors import left_out
+from svo.observers.window_kernel.memory import BASE, FLOOR, PENDING, TIME, UNIT
 from svo.observers.window_kernel.rounding import carry_error, error_of, turn_frame
 from svo.observers.window_kernel.rows import arrival_rows, clear_row, midpoint, place_row
 from svo.observers.window_kernel.short_rows import copy
@@ -40,7 +41,7 @@ def _load_transition(w, size, k):
 
 @njit(error_model="numpy")
 def _respond(w, size, k):
-    """Free response, magnitude and rounding bound of x(k+1) from those of x(k)."""
+    """Free response, magnitude and bound of the error of x(k+1), by rounding and by channels, from those of x(k)."""
     n = size.n
     s, t = k % (size.N + 1), (k + 1) % (size.N + 1)
     gamma = 2.0 * UNIT * (n + size.nu + size.nw + size.nq + 8)
@@ -55,7 +56,7 @@ def _respond(w, size, k):
         w.phi[t, i] = value
         w.mag[t, i] = magnitude
         w.terms[t, i] = magnitude
-        fresh[i] = gamma * magnitude
+        fresh[i] = gamma * magnitude + left_out(w, size, k, i) + FLOOR
         w.err[t, i] = (error + fresh[i]) * (1.0 + 1e-12)
     carry_error(w.carry[s], w.frame[t], w.rho[s], fresh, w.rho[t])
     for i in range(n):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from svo.observers.window_kernel.factors import left_out
 from svo.observers.window_kernel.memory import BASE, UNIT
 from svo.observers.window_kernel.short_rows import copy, fill
 
@@ -127,8 +128,9 @@ def measure_sensor(w, psi, size, k, o, eps):
             magnitude += abs(coefficient) * (abs(w.vc[v, nw + q]) + w.vr[v, nw + q])
     slack = eps * magnitude
     w.slack[s, o] = slack
-    w.raw_lower[i] = y - known - noise - slack
-    w.raw_upper[i] = y - known + noise + slack
+    width = noise + slack + (left_out(w, size, k, r) if size.late == 1 else 0.0)
+    w.raw_lower[i] = y - known - width
+    w.raw_upper[i] = y - known + width
     w.row_c[i] = magnitude
     set_row(w, psi, i, s, first, nv if size.late == 1 else 0, noise + slack)
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from svo.observers.window_kernel.channels import bound_channels, factor_all, open_channel
+from svo.normal_form import ENORMOUS
+from svo.observers.window_kernel.channels import bound_channels, open_channel
+from svo.observers.window_kernel.factors import factor_sample
 from svo.observers.window_kernel.memory import LARGEST, PENDING, STARTED, TIME, UNDECIDED
 from svo.observers.window_kernel.motion import advance, anchor, slide
 from svo.observers.window_kernel.programs import ALL, ARRIVAL, CHANNELS, solve_programs
@@ -92,9 +94,8 @@ def _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper,
         _bound_disturbance(w, size, new, w_lower, w_upper)
     elif not first:
         _bound_disturbance(w, size, k, w_old_lower, w_old_upper)
-    v = opened % (size.N + size.late)
     opens = size.late == 1 or not first
-    if opens and not factor_all(w.stack[opened % (size.N + 1)], w.owner, w.gain[v], w.functional[v]):
+    if opens and not factor_sample(w, size, opened):
         return RANK_ROSE
     if size.late == 0:
         _store_sample(w, size, new, u_next, y, stack, noise)
@@ -108,8 +109,11 @@ def _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper,
 
 @njit(error_model="numpy")
 def _is_bounded(w, size, k):
-    """Whether the newest state and the slack of its readings have bounds of use; NaN and infinity are none."""
-    s = k % (size.N + 1)
+    """Whether the newest state, its inputs and the slack of its readings have bounds of use: no NaN, no infinity."""
+    s, before = k % (size.N + 1), (k - 1) % (size.N + 1)
+    for j in range(size.nu):
+        if abs(w.u[s, j]) >= ENORMOUS or (k > 0 and abs(w.u[before, j]) >= ENORMOUS):
+            return False
     for j in range(size.n):
         if not w.mag[s, j] < LARGEST:
             return False

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 
 from polytopes import HPolytope
 from svo.model import UncertainModel, Uncertainty
+from svo.observers.left_out import factors_of
 from svo.observers.proof import WindowCertificate
 from svo.observers.window import WindowObserver
 from tests.svo.observers.falsified_windows import (
@@ -88,8 +89,11 @@ def test_an_uncertainty_of_two_ranks_needs_two_channels() -> None:
 def test_an_uncertain_output_of_the_newest_sample_is_not_overlooked() -> None:
     certificate = certificate_of_jump(drift(x_row=0.1))
     assert not certificate.late
-    stack = drift(x_row=0.1, y_row=2.0).stack()  # there s = 2 x
-    forged = sample_changed(certificate, 1, stack=stack, s_lower=np.array([1.0]), s_upper=np.array([3.0]))
+    stack = drift(x_row=0.1, y_row=2.0).stack()
+    factors = factors_of(stack, certificate.owner, certificate.delta, certificate.units)
+    assert factors is not None
+    s = factors.functionals[:, 0]  # times x
+    forged = sample_changed(certificate, 1, stack=stack, s_lower=0.5 * s, s_upper=1.5 * s)
     assert judge(forged) == "feasible"
     assert not forged.verify()
     assert not replace(forged, late=True).verify()
@@ -161,7 +165,7 @@ def test_bounds_of_a_known_s_are_checked() -> None:
     observer.update([1.0])
     certificate = observer.step([1.0], [3.0]).certificate
     assert certificate is not None
-    forged = sample_changed(certificate, 0, s_lower=np.array([-0.5]), s_upper=np.array([0.5]))
+    forged = sample_changed(certificate, 0, s_lower=np.array([-0.1]), s_upper=np.array([0.1]))
     assert certificate.verify()
     assert not forged.verify()
 

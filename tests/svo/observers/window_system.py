@@ -2,7 +2,8 @@
 
 States, disturbances and channels are all variables here, the hull of p = Delta s is drawn anew, and HiGHS (on
 floats) only proposes: what it says counts once Fractions confirm it. So neither the formulation nor the method nor
-the arithmetic is that of the certificate's own check. Multipliers and lines of the certificate are not read.
+the arithmetic is that of the certificate's own check. Multipliers and lines of the certificate are not read. What the
+channels leave out of an uncertainty is a variable of each row, bounded over the boxes of what it multiplies.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from svo.observers.left_out import factors_of
 from svo.observers.proof import WindowCertificate, WindowSample
 
 Array = NDArray[np.float64]
@@ -40,10 +42,10 @@ class _System:
     def __init__(self, c: WindowCertificate) -> None:
         self.c = c
         self.n, self.nw, self.nq = c.n, c.samples[0].w_lower.size, len(c.owner)
-        self.size = self.n + self.nw + self.nq
+        self.size = 2 * self.n + self.nw + self.nq + c.samples[0].y.size
         self.rows: list[TwoSided] = []
         self.boxes: dict[int, tuple[Fraction, Fraction]] = {}
-        self.factors = [_channels(s.stack, c.owner) for s in c.samples]
+        self.factors = [_channels(c, s.stack) for s in c.samples]
         self._arrival()
         for k in range(len(c.samples)):
             self._sample(k)
@@ -58,6 +60,9 @@ class _System:
 
     def _p(self, k: int, q: int) -> int:
         return k * self.size + self.n + self.nw + q
+
+    def _rest(self, k: int, i: int) -> int:
+        return k * self.size + self.n + self.nw + self.nq + i
 
     def _arrival(self) -> None:
         a = self.c.arrival
@@ -81,6 +86,10 @@ class _System:
             row, constant = self._line(k, s, [Fraction(v) for v in s.stack[0, i]])
             for q, (gain, _) in enumerate(self.factors[k]):
                 row[self._p(k, q)] = gain[i]
+            rest = Fraction(0) if newest and i < n else self._left_out(k, s, i)
+            if rest:
+                self.boxes[self._rest(k, i)] = -rest, rest
+                row[self._rest(k, i)] = Fraction(1)
             row = {j: v for j, v in row.items() if v}
             if i < n and not newest:
                 self._next_state(self._x(k + 1, i), row, constant)
@@ -95,6 +104,21 @@ class _System:
         row = {self._x(k, j): coefficients[j] for j in range(n)}
         row |= {self._w(k, j): coefficients[n + nu + 1 + j] for j in range(self.nw)}
         return row, sum((coefficients[n + j] * Fraction(s.u[j]) for j in range(nu)), coefficients[n + nu])
+
+    def _left_out(self, k: int, s: WindowSample, i: int) -> Fraction:
+        """Bound of what the channels leave out of row i of the uncertainties."""
+        total = Fraction(0)
+        for item in range(1, len(s.stack)):
+            mine = [q for q in range(self.nq) if self.c.owner[q] == item]
+            reach = max((abs(Fraction(d)) for q in mine for d in self.c.delta[q]), default=Fraction(0))
+            factors = [self.factors[k][q] for q in mine]
+            left = [Fraction(v) - sum(g[i] * f[j] for g, f in factors) for j, v in enumerate(s.stack[item, i])]
+            row, _ = self._line(k, s, [abs(v) for v in left])
+            known = [*(abs(Fraction(v)) for v in s.u), Fraction(1)]
+            constant = sum(abs(v) * u for v, u in zip(left[self.n :], known, strict=False))
+            reached = sum(v * max(map(abs, self.boxes[j])) for j, v in row.items() if v)
+            total += reach * (constant + reached)
+        return total
 
     def _disturbance(self, k: int, s: WindowSample) -> None:
         for j in range(self.nw):
@@ -196,6 +220,7 @@ class _System:
                 for i in range(n):
                     row, constant = self._line(k, s, [Fraction(v) for v in s.stack[0, i]])
                     row |= {self._p(k, q): gain[i] for q, (gain, _) in enumerate(self.factors[k])}
+                    row |= {self._rest(k, i): Fraction(1)} if self._rest(k, i) in self.boxes else {}
                     exact[self._x(k + 1, i)] = constant + _value(row, exact)
         return all(
             (r.lower is None or r.lower <= _value(r.row, exact))
@@ -208,21 +233,9 @@ def _value(row: Row, point: dict[int, Fraction]) -> Fraction:
     return sum((v * point[j] for j, v in row.items() if v), Fraction(0))
 
 
-def _channels(stack: Array, owner: NDArray[np.int64]) -> list[tuple[list[Fraction], list[Fraction]]]:
-    """(gain, functional) of every channel: the largest entry's row, and its column over it; then what is left."""
-    rests = {int(item): [[Fraction(v) for v in row] for row in stack[item]] for item in set(owner)}
-    found = []
-    for item in owner:
-        rest = rests[int(item)]
-        _, i, j = max(((abs(v), -a, -b) for a, row in enumerate(rest) for b, v in enumerate(row)))
-        pivot = rest[-i][-j]
-        # rounding of a lower rank is no channel
-        if abs(pivot) <= Fraction(1e-13) * Fraction(np.abs(stack[item]).max()):
-            found.append(([Fraction(0)] * len(rest), [Fraction(0)] * len(rest[0])))
-            continue
-        gain, functional = [row[-j] / pivot for row in rest], rest[-i]
-        rests[int(item)] = [
-            [v - g * f for v, f in zip(row, functional, strict=True)] for g, row in zip(gain, rest, strict=True)
-        ]
-        found.append((gain, functional))
-    return found
+def _channels(c: WindowCertificate, stack: Array) -> list[tuple[list[Fraction], list[Fraction]]]:
+    """(gain, functional) of every channel. Which ones is the observer's choice: `_left_out` bounds what they miss."""
+    found = factors_of(stack, c.owner, c.delta, c.units)
+    assert found is not None
+    gains, functionals = ([[Fraction(v) for v in row] for row in m] for m in (found.gains, found.functionals))
+    return list(zip(gains, functionals, strict=True))
