@@ -77,12 +77,12 @@ def model_digest(model: UncertainModel, options: Options, samples: Iterable[Mode
     for name, promise in (("physical", model.physical_range), ("largest", model.start_range)):
         if promise is not None:
             content[name] = [promise.lower, promise.upper]
-    text = json.dumps(_canonical(content), sort_keys=True, separators=(",", ":"))
+    text = json.dumps(canonical(content), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _canonical(value: Any) -> Any:
-    """With every float in hexadecimal."""
+def canonical(value: Any) -> Any:
+    """A value as JSON can hold it, with every float in hexadecimal."""
     if isinstance(value, bool) or value is None or isinstance(value, str | int):
         return value
     if isinstance(value, float | np.floating):
@@ -90,7 +90,7 @@ def _canonical(value: Any) -> Any:
     if isinstance(value, np.integer):
         return int(value)
     if isinstance(value, Mapping):
-        return {key: _canonical(item) for key, item in value.items()}
+        return {key: canonical(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_canonical(item) for item in value]
+        return [canonical(item) for item in value]
     return encode_value(value)

@@ -16,12 +16,16 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.isolation.logic import LogicState, Tally
+from svo.model_digest import canonical
+from svo.observers.saved_state import digest_of_arrays
+from svo.observers.step import Observer
 
 if TYPE_CHECKING:
     from svo.isolation.bank import Bank
 
 State = dict[str, NDArray[Any]]
 _SET = ("A", "b", "C", "d")
+_SEAL = "bank.seal"
 
 
 def saved_state(bank: Bank) -> State:
@@ -38,6 +42,7 @@ def saved_state(bank: Bank) -> State:
     state["bank.conclusions"] = np.array(json.dumps(conclusions))
     for key, value in (*bank._latest.arrays().items(), *bank._memory().items()):
         state[f"bank.{key}"] = value
+    state[_SEAL] = np.array(digest_of_arrays(_own(state)))
     return state
 
 
@@ -48,13 +53,29 @@ def restore_state(bank: Bank, state: Mapping[str, NDArray[Any]]) -> None:
         if conclusions["kind"] != _kind(bank):
             raise ValueError(f"it is of {conclusions['kind']}, this bank is {_kind(bank)}")
         logic = _logic_state(conclusions["logic"])
+        if str(state[_SEAL]) != digest_of_arrays(_own(state)):
+            raise ValueError("its conclusions were changed since state_dict() made it")
         observers = {
-            name: type(observer).from_state_dict(observer.model, _part(state, f"observer.{i}."))  # type: ignore[attr-defined]
+            name: _restored(name, observer, _part(state, f"observer.{i}."))
             for i, (name, observer) in enumerate(bank.observers.items())
         }
         bank._resume(conclusions["sample"], logic, observers, _part(state, "bank."))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"state does not belong to this bank: {error}") from error
+
+
+def _restored(name: str, observer: Observer, state: State) -> Observer:
+    """An observer as a state describes it, which must be one like the bank's."""
+    again: Observer = type(observer).from_state_dict(observer.model, state)  # type: ignore[attr-defined]
+    options, wanted = getattr(again, "options", None), getattr(observer, "options", None)
+    if options is not None and wanted is not None and canonical(options) != canonical(wanted):
+        raise ValueError(f"observer {name!r} has other options than this bank's")
+    return again
+
+
+def _own(state: Mapping[str, NDArray[Any]]) -> State:
+    """What is the bank's own."""
+    return {key: value for key, value in state.items() if key.startswith("bank.") and key != _SEAL}
 
 
 def set_arrays(name: str, P: HPolytope | None) -> State:

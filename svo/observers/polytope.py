@@ -21,6 +21,7 @@ from svo.observers.polytope_sets import PublishedRecursion, Sample, SoundRecursi
 from svo.observers.polytope_state import read_outcome, read_sample, read_set, write_outcome, write_sample, write_set
 from svo.observers.polytope_step import PolytopeRecord, PolytopeStep
 from svo.observers.readings import NO_SAMPLE
+from svo.observers.saved_state import check_model, check_unchanged, last_schedule, sealed
 from svo.observers.window_setup import finite_box, may_be_nonzero
 
 Array = NDArray[np.float64]
@@ -192,7 +193,7 @@ class PolytopeObserver(RestartingPolytope):
         if self._last is not None:
             sample, outcome = self._last
             state |= write_sample("sample", sample) | write_outcome("outcome", outcome)
-        return state
+        return sealed(state, self.model, self.options, self._schedule)
 
     @classmethod
     def from_state_dict(cls, model: UncertainModel, state: Mapping[str, NDArray]) -> PolytopeObserver:
@@ -201,9 +202,10 @@ class PolytopeObserver(RestartingPolytope):
         Raises
         ------
         ValueError
-            If the state is not that of a polytope observer of such a model.
+            If the state is not that of a polytope observer of this very model, or was changed since.
         """
         try:
+            check_unchanged(state)
             horizon, facets, eps, published = (float(v) for v in state["settings"])
             limit = None if facets < 0 else int(facets)
             observer = cls.__new__(cls)
@@ -214,6 +216,8 @@ class PolytopeObserver(RestartingPolytope):
                 if sample.stack.shape != model.stack(model.schedule).shape:
                     raise ValueError(f"its stack has shape {sample.stack.shape}")
                 observer._last = sample, read_outcome(state, "outcome")
+            check_model(state, model, observer.options)
+            observer._schedule = last_schedule(state)
             observer._restore(state)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"state does not belong to a polytope observer of this model: {error}") from error
@@ -241,7 +245,7 @@ class PolytopeObserver(RestartingPolytope):
     def _sample(self, number: int, y: ArrayLike, u: Array, schedule: Any) -> Sample:
         """Model and data of a sample, in normal form."""
         outputs, form = outputs_of(self.model, y), self._form
-        stack = stack_at(form.model, schedule)
+        stack, self._schedule = stack_at(form.model, schedule), schedule
         lower, upper, noise = form.model.bounds(schedule)
         disturbances, read = self._disturbances(lower, upper), readable(form.outputs(outputs))
         return Sample(number, stack, disturbances, noise, form.inputs(u), read, (lower, upper))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +48,7 @@ class RestartingPolytope:
         self._number = -1
         self._readings: Readings | None = None  # of an observer that has lost its set
         self.largest_at: int | None = None
+        self._schedule: Any = None  # of the newest sample
 
     def lose_set(self) -> None:
         """Forget all data; nothing is known of the state at the next measurement.

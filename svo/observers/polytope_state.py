@@ -55,9 +55,13 @@ def write_outcome(name: str, outcome: Outcome) -> State:
 
 
 def read_outcome(state: Mapping[str, NDArray], name: str) -> Outcome:
+    """What `write_outcome` wrote; ValueError if it claims a falsification that its certificate does not prove."""
+    verdict, certificate = VERDICTS[int(state[f"{name}.verdict"])], _read_certificate(state, f"{name}.certificate")
+    if verdict == "falsified" and (certificate is None or not certificate.verify()):
+        raise ValueError("its falsification cannot be proven again")
     return Outcome(
-        VERDICTS[int(state[f"{name}.verdict"])],
-        _read_certificate(state, f"{name}.certificate"),
+        verdict,
+        certificate,
         read_set(state, f"{name}.joint"),
         _read_groups(state, f"{name}.memory"),
         tuple(

@@ -18,6 +18,7 @@ from svo.observers import window_kernel as kernel
 from svo.observers.data import check_schedule, inputs_shaped, outputs_shaped, steps_of
 from svo.observers.given_units import arrival_in
 from svo.observers.proof import ArrivalSet
+from svo.observers.saved_state import check_model, check_unchanged, last_schedule, sealed, take_exactly
 from svo.observers.step import VerdictName
 from svo.observers.window_programs import ENTRY_ERRORS
 from svo.observers.window_restart import RestartingWindow
@@ -224,14 +225,20 @@ class WindowObserver(RestartingWindow):
         return {"kind": "window", "horizon": horizon, "template": rows, "eps": self.eps, "sign_split": cells}
 
     def state_dict(self) -> dict[str, Array]:
-        """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
+        """Everything that the next steps depend on, as named arrays (for ``numpy.savez``).
+
+        Raises
+        ------
+        TypeError
+            If the schedule of the last sample is no number or array of numbers.
+        """
         settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps, self.sign_split])
         first = {f"initial.{f.name}": getattr(self._initial, f.name) for f in fields(self._initial)}
         last = dict(zip(("w_old_lower", "w_old_upper"), self._last_bounds or (), strict=False))
         falsified = np.array(float(self._falsified is not None))
         state = {"settings": settings, "falsified": falsified, "template": self._template, **first, **last}
         state |= self._form.state_dict() | self._arrays | self._restart_state()
-        return {name: value.copy() for name, value in state.items()}
+        return sealed(state, self.model, self.options, self._schedule)
 
     @classmethod
     def from_state_dict(cls, model: UncertainModel, state: Mapping[str, Array]) -> WindowObserver:
@@ -240,9 +247,10 @@ class WindowObserver(RestartingWindow):
         Raises
         ------
         ValueError
-            If the state is not that of a window observer of such a model.
+            If the state is not that of a window observer of this very model, or was changed since.
         """
         try:
+            check_unchanged(state)
             horizon, steps, eps, cells = (float(v) for v in state["settings"])
             initial = ArrivalSet(**{f.name: np.array(state[f"initial.{f.name}"]) for f in fields(ArrivalSet)})
             observer = cls.__new__(cls)
@@ -250,14 +258,14 @@ class WindowObserver(RestartingWindow):
             observer._configure(form, None if horizon < 0 else int(horizon), state["template"], eps, int(cells))
             observer._begin_first(initial)
             observer._restore_restart(state, int(steps))
-            for name, array in observer._arrays.items():
-                array[...] = state[name]
+            take_exactly(observer._arrays, state)
+            check_model(state, model, observer.options)
+            observer._schedule = last_schedule(state)
+            if "w_old_lower" in state:
+                observer._last_bounds = (np.array(state["w_old_lower"]), np.array(state["w_old_upper"]))
+            observer._check_restored(bool(state["falsified"]))
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"state does not belong to a window observer of this model: {error}") from error
-        if "w_old_lower" in state:
-            observer._last_bounds = (np.array(state["w_old_lower"]), np.array(state["w_old_upper"]))
-        if state["falsified"]:
-            observer._prove_again()
         return observer
 
     def run(self, log: Log) -> WindowRecord:
@@ -305,6 +313,7 @@ class WindowObserver(RestartingWindow):
     def _evaluate(self, schedule: Any) -> tuple[Array, tuple[Array, Array, Array]]:
         """Matrices and bounds of a sample, in normal form."""
         check_schedule(self.model, schedule)
+        self._schedule = schedule
         return self._form.model.stack(schedule), self._form.model.bounds(schedule)
 
     def _sample(

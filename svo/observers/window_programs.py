@@ -203,6 +203,18 @@ class WindowPrograms(WindowMemory):
         if self._falsified is None:
             self._falsified = next(self._statements())
 
+    def _check_restored(self, falsified: bool) -> None:
+        """Raise ValueError if a clock that was read back is none, or its falsification cannot be proven again."""
+        clock = self._arrays["clock"]
+        base, time, steps = int(clock[kernel.BASE]), int(clock[kernel.TIME]), self._size.N
+        flags = clock[[kernel.STARTED, kernel.PENDING]]
+        if not (0 <= base <= time <= base + steps and np.isin(flags, (0, 1)).all() and (clock >= 0).all()):
+            raise ValueError(f"its window holds samples {base} to {time}; expected at most {steps} steps from 0 on")
+        if falsified:
+            self._prove_again()
+            if self._falsified is None or not self._falsified.verify():
+                raise ValueError("its falsification cannot be proven again")
+
     def _ask_highs(self) -> VerdictName:
         w = self._arrays
         feasible, ray = is_feasible(w["G"], w["lower"], w["upper"])

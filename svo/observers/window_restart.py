@@ -38,6 +38,7 @@ class RestartingWindow(WindowPrograms):
         """Forget everything but a set of first states."""
         self._initial = initial
         self.largest_at, self._reason, self._lost, self._lost_at, self._readings = None, None, False, -1, None
+        self._schedule: Any = None  # of the newest sample
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)
         self._begin(initial, self._first_steps)
 

@@ -20,6 +20,7 @@ from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.proof import WindowSample
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
+from svo.observers.saved_state import check_model, check_unchanged, last_schedule, sealed
 from svo.observers.step import VerdictName
 from svo.observers.window_kernel import LARGEST
 from svo.observers.window_setup import first_states, needs_next_input
@@ -108,6 +109,7 @@ class ConstrainedZonotopeObserver:
         self._falsified: ZonotopeCertificate | None = None
         self._readings: Readings | None = None  # of an observer that has lost its set
         self.largest_at: int | None = None
+        self._schedule: Any = None  # of the newest sample
 
     def lose_set(self) -> None:
         """Forget all data; nothing is known of the state at the next measurement.
@@ -220,7 +222,7 @@ class ConstrainedZonotopeObserver:
         for i, stage in enumerate(self._stages):
             state |= _named(f"{i}.arrival", stage.arrival)
             state |= {f"{i}.{name}": getattr(stage.data, name).copy() for name in _SAMPLE}
-        return state
+        return sealed(state, self.model, self.options, self._schedule)
 
     @classmethod
     def from_state_dict(cls, model: UncertainModel, state: Mapping[str, Array]) -> ConstrainedZonotopeObserver:
@@ -229,13 +231,16 @@ class ConstrainedZonotopeObserver:
         Raises
         ------
         ValueError
-            If the state is not that of a constrained-zonotope observer of such a model.
+            If the state is not that of a constrained-zonotope observer of this very model, or was changed since.
         """
         try:
+            check_unchanged(state)
             number, falsified, generators, constraints, eps = (float(v) for v in state["settings"])
             observer = cls.__new__(cls)
             observer._configure(NormalForm.from_state_dict(model, state), int(generators), int(constraints), eps)
-            observer._first = _read(state, "first")
+            check_model(state, model, observer.options)
+            observer._forget(_read(state, "first"))
+            observer._schedule = last_schedule(state)
             observer._restore(int(number), bool(falsified), state)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"state does not belong to a zonotope observer of this model: {error}") from error
@@ -301,7 +306,8 @@ class ConstrainedZonotopeObserver:
     def _data(self, u: Array, y: Array, schedule: Any) -> WindowSample:
         """Model and data of a sample, in normal form."""
         form, model = self._form, self._normal
-        return self._builder.data(stack_at(model, schedule), model.bounds(schedule), form.inputs(u), form.outputs(y))
+        stack, self._schedule = stack_at(model, schedule), schedule
+        return self._builder.data(stack, model.bounds(schedule), form.inputs(u), form.outputs(y))
 
     def _conclude(
         self, before: tuple[Stage, ...], now: Stage, states: ConstrainedZonotope | None, begun: float
@@ -357,7 +363,7 @@ class ConstrainedZonotopeObserver:
         self._stages, self._number, self._falsified = tuple(stages), number, None
         self.largest_at, self._readings = None if largest == NO_SAMPLE else largest, None
         if lost:
-            self._readings = Readings(self.model, self.eps)
+            self._readings = Readings(self._normal, self.eps)
             prefix = "readings."
             self._readings.restore({k.removeprefix(prefix): state[k] for k in state if k.startswith(prefix)})
         if falsified and self._decide(self._stages[:-1], self._stages[-1]) != "falsified":

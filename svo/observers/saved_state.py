@@ -1,0 +1,99 @@
+"""States of observers that belong to one model: a seal of two digests, checked before anything is believed.
+
+``seal.model`` is the digest of the model and of the observer's options (`svo.model_digest`), with the matrices at the
+model's typical schedule and at that of the last sample; ``seal.state`` is that of every array beside it. What a state
+concludes is not believed either: observers prove a falsification again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.model import UncertainModel
+from svo.model_digest import ModelSample, Options, model_digest
+
+State = Mapping[str, NDArray[Any]]
+MODEL, WHOLE, SCHEDULE = "seal.model", "seal.state", "seal.schedule"
+
+
+def sealed(state: State, model: UncertainModel, options: Options, schedule: Any) -> dict[str, NDArray[Any]]:
+    """A copy of a state with the digests of its model and of itself.
+
+    Parameters
+    ----------
+    state : mapping of str to array
+    model : UncertainModel
+    options : mapping
+        Of the observer, as its ``options``.
+    schedule : optional
+        Scheduling value of the last sample; None before it, and for a model without.
+    """
+    copied = {name: np.array(value) for name, value in state.items()}
+    if schedule is not None:
+        copied[SCHEDULE] = _as_array(schedule)
+    copied[MODEL] = np.array(_digest_of_model(copied, model, options))
+    copied[WHOLE] = np.array(digest_of_arrays(copied))
+    return copied
+
+
+def check_unchanged(state: State) -> None:
+    """Raise ValueError if a state has no seal, or an array that is not as it was when the state was made."""
+    if MODEL not in state or WHOLE not in state:
+        raise ValueError("it has no seal of its model, which state_dict() writes")
+    if str(state[WHOLE]) != digest_of_arrays(state):
+        raise ValueError("its arrays were changed, or some are missing, since state_dict() made it")
+
+
+def check_model(state: State, model: UncertainModel, options: Options) -> None:
+    """Raise ValueError if a state is that of another model, or of an observer with other options."""
+    if str(state[MODEL]) != _digest_of_model(state, model, options):
+        raise ValueError(
+            "it is the state of another model or of other options; expected the very numbers that the observer was "
+            "made with: matrices, bounds, sampling time, horizon"
+        )
+
+
+def take_exactly(target: Mapping[str, NDArray[Any]], state: State) -> None:
+    """Copy arrays of the same names; ValueError unless each has exactly the type and the shape of its target."""
+    for name, array in target.items():
+        value = np.asarray(state[name])
+        if value.dtype != array.dtype or value.shape != array.shape:
+            raise ValueError(f"{name} is {value.dtype} {value.shape}; expected {array.dtype} {array.shape}")
+        array[...] = value
+
+
+def last_schedule(state: State) -> Any:
+    """The scheduling value that a state was made with, or None."""
+    if SCHEDULE not in state:
+        return None
+    value = np.array(state[SCHEDULE])
+    return value.item() if value.ndim == 0 else value
+
+
+def _as_array(schedule: Any) -> NDArray[Any]:
+    value = np.asarray(schedule)
+    if value.dtype.kind not in "iuf":
+        raise TypeError(f"schedule is {schedule!r}; a state can hold a number or an array of numbers only")
+    return value
+
+
+def _digest_of_model(state: State, model: UncertainModel, options: Options) -> str:
+    samples = [ModelSample.of(model, model.schedule)]
+    if model.is_scheduled and SCHEDULE in state:
+        samples.append(ModelSample.of(model, last_schedule(state)))
+    return model_digest(model, options, samples)
+
+
+def digest_of_arrays(state: State) -> str:
+    """SHA-256 of the names, types, shapes and bytes of all arrays but the seal itself."""
+    whole = hashlib.sha256()
+    for name in sorted(set(state) - {WHOLE}):
+        value = np.ascontiguousarray(state[name])
+        whole.update(f"{name} {value.dtype.str} {value.shape}\n".encode())
+        whole.update(value.tobytes())
+    return whole.hexdigest()
