@@ -21,7 +21,7 @@ from rich.console import Console
 
 from svo.log_file import write_log
 from svo.plant import load_plant
-from svo.watch.lines import FileLines
+from svo.watch.follow import FileLines
 from svo.watch.session import Session, Status
 from svo.watch.view import view_of
 
@@ -65,7 +65,7 @@ def follow(samples: int, terminal: bool) -> Live:
                 for line in lines.read(wait=1.0) or []:
                     session.feed(line)
                     view.show(session.status, 0)
-                    sent = line.rpartition(",")[2]
+                    sent = line.text.rpartition(",")[2]
                     if sent != "sent":
                         lags.append(time.time() - float(sent))
                 if writer.poll():

@@ -70,13 +70,7 @@ ModelDifference = Callable[[Alarm], str | None]
 def write_alarms(path: str | Path, alarms: Iterable[Alarm]) -> None:
     """Write alarms as JSON Lines."""
     with open(path, "w", encoding="utf-8") as file:
-        file.writelines(_line(alarm) for alarm in alarms)
-
-
-def append_alarm(path: str | Path, alarm: Alarm) -> None:
-    """Add one alarm to a JSON Lines file, which is made if need be."""
-    with open(path, "a", encoding="utf-8") as file:
-        file.write(_line(alarm))
+        file.writelines(alarm_line(alarm) for alarm in alarms)
 
 
 def read_alarms(path: str | Path) -> list[Alarm]:
@@ -180,7 +174,8 @@ def _digest(record: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _line(alarm: Alarm) -> str:
+def alarm_line(alarm: Alarm) -> str:
+    """The record of an alarm, with its end."""
     record = _encode(alarm)
     record["sha256"] = _digest(record)
     return json.dumps(record, sort_keys=True) + "\n"

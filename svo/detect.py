@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.alarm_folder import ALARMS, VERDICT, check_no_results
 from svo.alarm_kinds import model_data
 from svo.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
@@ -20,6 +21,7 @@ from svo.log_columns import check_times, columns_of_log
 from svo.model_digest import model_digest
 from svo.observers.step import Observer
 from svo.plant import MonitoredPlant, Scheduler, architecture_of, schedule_of
+from svo.store import write_text, write_whole
 
 
 @dataclass(frozen=True)
@@ -199,9 +201,15 @@ def write_detection(folder: str | Path, detection: Detection, beside: Mapping[st
     """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be.
 
     ``beside`` is added to verdict.json: what detectors without certificates say, by name.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds results already; nothing is overwritten.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    write_alarms(folder / "alarms.jsonl", detection.alarms)
+    check_no_results(folder)
+    write_whole(folder / ALARMS, lambda file: write_alarms(file, detection.alarms))
     verdict = {**detection.to_dict(), **(beside or {})}
-    (folder / "verdict.json").write_text(json.dumps(verdict, indent=2) + "\n", encoding="utf-8")
+    write_text(folder / VERDICT, json.dumps(verdict, indent=2) + "\n")

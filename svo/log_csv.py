@@ -103,13 +103,15 @@ class RowParser:
             raise ValueError(f"{self._source}, line {line}: {len(row)} cells; expected {self._width}, as in the header")
         return [self._number(line, i, row[position]) for i, position in enumerate(self._where)]
 
+    def readable(self, row: Sequence[str]) -> list[float] | None:
+        """The numbers of a row in which not every cell is one, NaN elsewhere; None if its cells can't be told apart."""
+        if len(row) != self._width:
+            return None
+        return [number if math.isfinite(number := _number(row[at])) else math.nan for at in self._where]
+
     def _number(self, line: int, i: int, cell: str) -> float:
-        text = cell.strip()
-        try:
-            value = float(text) if text else math.nan
-        except ValueError:
-            value = math.inf
-        if math.isinf(value) or "_" in text:
+        value = _number(cell)
+        if math.isinf(value):
             raise not_finite(self._place(line, i), cell)
         if math.isnan(value) and not self._may_be_missing[i]:
             raise not_there(self._place(line, i))
@@ -117,6 +119,15 @@ class RowParser:
 
     def _place(self, line: int, i: int) -> str:
         return f"{self._source}, line {line}, column {self.names[i]!r}"
+
+
+def _number(cell: str) -> float:
+    """NaN for an empty cell, infinity for what is no number."""
+    text = cell.strip()
+    try:
+        return float(text) if text and "_" not in text else math.inf if text else math.nan
+    except ValueError:
+        return math.inf
 
 
 def _check_separator(source: str, present: Sequence[str], columns: Columns) -> None:

@@ -36,6 +36,14 @@ class AirspeedFilter:
             self._started = True
         return self._value
 
+    def state_dict(self) -> dict[str, Array]:
+        """Everything that the next samples depend on (`svo.plant.SavesSchedule`)."""
+        return {"value": np.array(self._value), "started": np.array(float(self._started))}
+
+    def load_state_dict(self, state: Mapping[str, Array]) -> None:
+        """Go on from what `state_dict` gave."""
+        self._value, self._started = float(state["value"]), bool(state["started"])
+
 
 @dataclass(frozen=True)
 class ScheduledBlocks:

@@ -105,6 +105,14 @@ class MeasuredSchedule:
         self._last = np.where(np.isnan(now), self._last, now)
         return self._last
 
+    def state_dict(self) -> dict[str, Array]:
+        """Everything that the next samples depend on (`svo.plant.SavesSchedule`)."""
+        return {"last": self._last}
+
+    def load_state_dict(self, state: Mapping[str, Array]) -> None:
+        """Go on from what `state_dict` gave."""
+        self._last = np.array(state["last"])
+
 
 @dataclass(frozen=True)
 class Embedding:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from svo.cli.destinations import writable_folder
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, measured_log, one_line_errors
-from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName
+from svo.cli.destinations import writable_file, writable_folder
+from svo.cli.frame import PREPARING, announce, app, chosen_noise, measured_log, note, one_line_errors
+from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName, positive
 from svo.cli.output import print_detection, print_json, say
 
 
@@ -19,7 +20,11 @@ def detect(
     log: LogFile,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", callback=writable_folder, help="Folder for alarms.jsonl and verdict.json."),
+        typer.Option(
+            metavar="DIR",
+            callback=writable_folder,
+            help="Folder for alarms.jsonl and verdict.json; nothing in it is overwritten.",
+        ),
     ] = None,
     noise: NoiseName = None,
     architecture: Architecture = None,
@@ -35,13 +40,18 @@ def detect(
       svo detect my.toml log.mat --out findings
     """
     with one_line_errors():
-        from svo.description import find_plant, keep_description
+        from svo.alarm_folder import check_no_results
+        from svo.description import check_kept_description, find_plant, keep_description
         from svo.detect import detect as run_detection
         from svo.detect import write_detection
         from svo.plant import DetectsThresholds, in_architecture
         from svo.progress import progress
 
+        if out is not None:
+            check_no_results(out)
         the_plant = in_architecture(find_plant(plant), architecture)
+        if out is not None:
+            check_kept_description(the_plant, out)
         noise = chosen_noise(the_plant, noise)
         samples = measured_log(log, the_plant)
         # First, for it takes no time, and what it may refuse would cost the bank's answer.
@@ -70,32 +80,46 @@ def watch(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", callback=writable_folder, help="Folder for alarms.jsonl, written as they are raised."
+            metavar="DIR",
+            callback=writable_folder,
+            help="Folder for alarms.jsonl, written as they are raised; those of the same watch before are kept.",
         ),
     ] = None,
     noise: NoiseName = None,
     until_end: Annotated[
         bool, typer.Option("--until-end", help="End where the file ends, instead of waiting for more.")
     ] = False,
+    silence: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", callback=positive, help="Say so when nothing has come for so long."),
+    ] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Keep the state there, and go on from it when the watch is started again."),
+    ] = None,
 ) -> None:
     """Show live what a plant's isolation bank says about a log that is still growing.
 
     Which models are alive, bounds of each state by each of them, and each alarm with its certificate. In a terminal a
-    table, elsewhere plain lines. It ends at Ctrl-C, or when standard input ends. The exit code is then 0.
+    table, elsewhere plain lines. The log is followed by its name through rotation, truncation and replacement; lines
+    that cannot be read are counted and reported. It ends at Ctrl-C or SIGTERM, or when standard input ends. The exit
+    code is then 0.
 
     \b
     Example:
-      svo watch eclipse log.csv --out findings
+      svo watch eclipse log.csv --out findings --state watch.state --silence 5
       logger | svo watch my.toml -
     """
-    with one_line_errors():
+    with one_line_errors(), ExitStack() as stack:
         from functools import partial
 
-        from svo.alarms import append_alarm, write_alarms
+        from svo.alarm_folder import watch_folder
         from svo.cli.output import console
-        from svo.description import find_plant, keep_description
-        from svo.watch.lines import lines_of
-        from svo.watch.session import Session
+        from svo.description import check_kept_description, find_plant, keep_description
+        from svo.watch.follow import lines_of
+        from svo.watch.session import Session, identity_of
+        from svo.watch.silence import Silence
+        from svo.watch.state import resume_state, save_state
         from svo.watch.view import view_of
         from svo.watch.watch import watch as run_watch
 
@@ -103,15 +127,24 @@ def watch(
         noise = chosen_noise(the_plant, noise)
         lines = lines_of(log, until_end)
         session = Session(the_plant, noise, lines.name)
-        keep = None
+        identity = identity_of(the_plant, noise, log)
+        keep = save = None
         if out is not None:
-            out.mkdir(parents=True, exist_ok=True)
-            write_alarms(out / "alarms.jsonl", [])
+            check_kept_description(the_plant, out)
+            alarms = stack.enter_context(watch_folder(out, identity))
             keep_description(the_plant, out)
-            keep = partial(append_alarm, out / "alarms.jsonl")
+            for text in alarms.notes:
+                note(text)
+            keep = alarms.add
+        if state is not None:
+            writable_file(state)
+            if state.exists():
+                resume_state(state, session, lines, identity)
+            save = partial(save_state, state, session, lines, identity)
         announce(PREPARING)
         session.warm_up()
-        run_watch(lines, session, view_of(console(), session), keep=keep)
+        quiet = None if silence is None else Silence(silence)
+        run_watch(lines, session, view_of(console(), session), keep=keep, save=save, silence=quiet)
 
 
 @app.command()

@@ -16,6 +16,13 @@ def finite(value: float) -> float:
     return value
 
 
+def positive(value: float | None) -> float | None:
+    """A finite number > 0, or none."""
+    if value is not None and not (math.isfinite(value) and value > 0):
+        raise typer.BadParameter(f"{value} is not a finite number > 0.")
+    return value
+
+
 DescribedName = Annotated[
     str, typer.Argument(metavar="PLANT", help="A registered plant, or a TOML file that describes one (my.toml).")
 ]

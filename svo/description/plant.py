@@ -21,7 +21,7 @@ from svo.isolation.bank import Bank
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.observers.window import WindowObserver
-from svo.plant import Column, Columns
+from svo.plant import Column, Columns, no_schedule
 
 _TOP = ("title", "Ts", "columns", "model", "initial", "observer", "faults", "global", "bank", "interval_detector")
 STATED = "stated"
@@ -99,7 +99,7 @@ class DescribedPlant:
 
     def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
         """A described model has no schedule."""
-        return lambda y: None
+        return no_schedule
 
     def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
         """What the interval detector says about a log; None if there is none in the file."""

@@ -8,7 +8,7 @@ gr.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,12 +91,13 @@ class FirstOrderScheduler:
     def __init__(self, predictor: Callable[[float], IntervalPredictor]) -> None:
         self._make = predictor
         self._predictor: IntervalPredictor | None = None
-        self._held = 0.0
+        self._first = self._held = 0.0
 
     def with_input(self, y: Array, u: Array) -> Array:
         """gc, gr, hc and spread (4,) of the transition that starts at this sample, from its y (1,) and u (1,)."""
         command, measured = float(u[0]), float(y[0])
         if self._predictor is None:
+            self._first = command
             self._predictor = self._make(command)
             self._held = self._predictor.interval.center
         if not np.isnan(measured):
@@ -104,3 +105,24 @@ class FirstOrderScheduler:
         _, bounds = self._predictor.transition(command, self._held)
         gc, gr, hc, hr = (float(getattr(bounds, name)) for name in ("gc", "gr", "hc", "hr"))
         return np.array([gc, gr, hc, (abs(1 - gc) + gr) * hr * abs(command)])
+
+    def state_dict(self) -> dict[str, Array]:
+        """Everything that the next samples depend on (`svo.plant.SavesSchedule`)."""
+        if self._predictor is None:
+            return {}
+        predictor = self._predictor
+        return {
+            "first": np.array(self._first),
+            "held": np.array(self._held),
+            "interval": np.array(predictor.interval),
+            "sample": np.array(float(predictor.sample)),
+        }
+
+    def load_state_dict(self, state: Mapping[str, Array]) -> None:
+        """Go on from what `state_dict` gave."""
+        if not state:
+            return
+        self._first, self._held = float(state["first"]), float(state["held"])
+        self._predictor = self._make(self._first)
+        center, radius = state["interval"]
+        self._predictor.resume(float(center), float(radius), int(state["sample"]))

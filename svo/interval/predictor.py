@@ -123,6 +123,11 @@ class IntervalPredictor:
         self._initial = self._interval = _checked_interval(center, radius)
         self._sample = 0
 
+    def resume(self, center: float, radius: float, sample: int) -> None:
+        """Go on at a sample at which the state is in center +- radius."""
+        self._interval = _checked_interval(center, radius)
+        self._sample = sample
+
     def step(self, u: float, y: float | None = None, schedule: Any = None) -> Interval:
         """The transition from sample k to k + 1.
 

@@ -52,7 +52,7 @@ def _who(folder: Path, file: IO[str]) -> str:
         file.seek(0)
         found = json.loads(file.read())
         holder = f"process {found['pid']} on {found['host']}, since {found['since']}"
-    return f"{folder} is in use by {holder}; wait until it is done, or stop it and go on with --resume"
+    return f"{folder} is in use by {holder}; wait until it is done, or stop it first"
 
 
 def _now() -> str:

@@ -1,20 +1,51 @@
-"""Complete lines of a text that grows: a file that another program writes to, or standard input.
+"""Lines of a text that grows, in linear time and bounded memory; what cannot be read is named as such.
 
-A last line that is only half written is kept until the rest of it arrives.
+Sources of lines are a file by its name (`svo.watch.follow`) and a stream (`svo.watch.stream`).
 """
 
 from __future__ import annotations
 
-import os
-import sys
-from pathlib import Path
-from queue import Empty, Queue
-from threading import Thread
-from time import monotonic, sleep
-from typing import BinaryIO, Protocol
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
 
-POLL_SECONDS = 0.005
-_CHUNK = 1 << 16
+LONGEST_LINE = 1 << 20  # bytes; of a longer one nothing is kept
+CHUNK = 1 << 14
+_END = re.compile(rb"\r\n|\n|\r")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line without its end.
+
+    Attributes
+    ----------
+    number : int
+        In its file, from 1.
+    text : str
+    fault : str or None
+        Why it cannot be read; ``text`` is empty then.
+    """
+
+    number: int
+    text: str
+    fault: str | None = None
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something that a reader of the log should know of.
+
+    Attributes
+    ----------
+    text : str
+    new_file : bool
+        Whether the lines after it are those of another file, which may have a header of its own.
+    """
+
+    text: str
+    new_file: bool = False
 
 
 class Lines(Protocol):
@@ -28,146 +59,84 @@ class Lines(Protocol):
 
     name: str
 
-    def read(self, wait: float) -> list[str] | None:
-        """Lines that are complete, without their ends; none after ``wait`` seconds of silence, None at the end."""
+    def read(self, wait: float) -> Sequence[Line | Notice] | None:
+        """What is new and complete; nothing after ``wait`` seconds of silence, None at the end."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """Where the lines that were read end, for JSON."""
+        ...
+
+    def resume(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `state` gave; before the first line is read."""
         ...
 
     def close(self) -> None: ...
 
 
-class FileLines:
-    """Lines of a file as it grows.
+class Splitter:
+    """Bytes in, complete lines out; a half one waits for its rest. A line ends with LF, CR LF or CR."""
 
-    Parameters
-    ----------
-    path : path
-    until_end : bool
-        End where the file ends, instead of waiting for more; a last line without an end then counts.
+    def __init__(self) -> None:
+        self.clear()
 
-    Raises
-    ------
-    OSError
-        If the file cannot be opened.
-    """
+    def clear(self) -> None:
+        """Forget the half line, and count from 1 again."""
+        self._half = bytearray()
+        self._too_long = self._after_cr = False
+        self.count = 0
 
-    def __init__(self, path: Path, until_end: bool) -> None:
-        self.name = str(path)
-        self._file: BinaryIO = path.open("rb")
-        self._until_end = until_end
-        self._splitter = _Splitter(self.name)
-        self._ended = False
+    def add(self, chunk: bytes) -> list[Line]:
+        """The lines that a chunk completes."""
+        if self._after_cr and chunk.startswith(b"\n"):
+            chunk = chunk[1:]
+            self._after_cr = False
+        if not chunk:
+            return []
+        self._after_cr = chunk.endswith(b"\r")
+        first, *rest = _END.split(chunk)
+        lines = []
+        for piece in rest:
+            self._keep(first)
+            lines.append(self._take())
+            first = piece
+        self._keep(first)
+        return lines
 
-    def read(self, wait: float) -> list[str] | None:
-        """See `Lines`.
+    @property
+    def half(self) -> int | None:
+        """The number of a line that has no end yet; None if there is none."""
+        return self.count + 1 if self._too_long or self._half.strip() else None
 
-        Raises
-        ------
-        ValueError
-            If the file became shorter, or is no UTF-8 text.
-        """
-        end = monotonic() + wait
-        while not self._ended:
-            chunk = self._file.read(_CHUNK)
-            if chunk:
-                lines = self._splitter.add(chunk)
-                if lines:
-                    return lines
-                continue
-            if self._until_end:
-                self._ended = True
-                return self._splitter.rest()
-            if os.fstat(self._file.fileno()).st_size < self._file.tell():
-                raise ValueError(f"{self.name} became shorter while it was read; start again on the new file")
-            if monotonic() >= end:
-                return []
-            sleep(POLL_SECONDS)
-        return None
+    def state(self) -> dict[str, Any]:
+        """For JSON."""
+        flags = {"too_long": self._too_long, "after_cr": self._after_cr}
+        return {"half": self._half.hex(), "count": self.count, **flags}
 
-    def close(self) -> None:
-        self._file.close()
+    def resume(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `state` gave."""
+        self._half = bytearray.fromhex(state["half"])
+        self._too_long, self._after_cr = bool(state["too_long"]), bool(state["after_cr"])
+        self.count = int(state["count"])
 
+    def _keep(self, piece: bytes) -> None:
+        self._too_long = self._too_long or len(self._half) + len(piece) > LONGEST_LINE
+        if self._too_long:
+            self._half.clear()
+        else:
+            self._half += piece
 
-class StreamLines:
-    """Lines of standard input, or of another open file descriptor; the end of the stream is the end."""
-
-    def __init__(self, descriptor: int | None = None, name: str = "standard input") -> None:
-        self.name = name
-        self._splitter = _Splitter(name)
-        self._chunks: Queue[bytes] = Queue(maxsize=64)
-        self._ended = False
-        # A thread, so that silence does not keep the view from being drawn; it dies with the program.
-        Thread(target=self._pump, args=(sys.stdin.fileno() if descriptor is None else descriptor,), daemon=True).start()
-
-    def read(self, wait: float) -> list[str] | None:
-        """See `Lines`.
-
-        Raises
-        ------
-        ValueError
-            If the stream is no UTF-8 text.
-        """
-        if self._ended:
-            return None
-        end = monotonic() + wait
-        while True:
-            try:
-                chunk = self._chunks.get(timeout=max(0.0, end - monotonic()))
-            except Empty:
-                return []
-            if not chunk:
-                self._ended = True
-                return self._splitter.rest()
-            lines = self._splitter.add(chunk)
-            if lines:
-                return lines
-
-    def close(self) -> None:
-        """Nothing: the stream belongs to the program."""
-
-    def _pump(self, descriptor: int) -> None:
-        chunk = b"?"
-        while chunk:
-            chunk = os.read(descriptor, _CHUNK)
-            self._chunks.put(chunk)
-
-
-def lines_of(log: str, until_end: bool) -> Lines:
-    """Standard input for "-", else a CSV file.
-
-    Raises
-    ------
-    ValueError
-        For a file that cannot be followed line by line.
-    """
-    if log == "-":
-        return StreamLines()
-    path = Path(log)
-    if path.suffix.lower() in (".parquet", ".mat"):
-        raise ValueError(f"{path} cannot be followed while it is written; expected a CSV file, or - for standard input")
-    return FileLines(path, until_end)
-
-
-class _Splitter:
-    """Bytes in, complete lines of text out."""
-
-    def __init__(self, name: str) -> None:
-        self._name, self._partial, self._count = name, b"", 0
-
-    def add(self, chunk: bytes) -> list[str]:
-        *complete, self._partial = (self._partial + chunk).split(b"\n")
-        return [self._text(line) for line in complete]
-
-    def rest(self) -> list[str]:
-        """The last line, where it has no end."""
-        partial, self._partial = self._partial, b""
-        return [self._text(partial)] if partial else []
-
-    def _text(self, line: bytes) -> str:
-        self._count += 1
+    def _take(self) -> Line:
+        """The half line as a whole one."""
+        self.count += 1
+        line, too_long = bytes(self._half), self._too_long
+        self._half.clear()
+        self._too_long = False
+        if too_long:
+            return Line(self.count, "", f"it is longer than {LONGEST_LINE} bytes")
+        if b"\0" in line:
+            return Line(self.count, "", "it has NUL bytes in it, which are no text")
         try:
-            return line.decode("utf-8-sig" if self._count == 1 else "utf-8").rstrip("\r")
+            return Line(self.count, line.decode("utf-8-sig" if self.count == 1 else "utf-8"))
         except UnicodeDecodeError as error:
-            raise ValueError(
-                f"{self._name}, line {self._count}: not a CSV text file ({error}); expected comma-separated columns in "
-                "UTF-8"
-            ) from error
+            return Line(self.count, "", f"it is not UTF-8 text ({error})")
