@@ -173,7 +173,7 @@ class Missile:
         from aircraft.missile.figures import write_figures
         from aircraft.missile.scenario_study import run_study
 
-        study = run_study(runs, seed, noise, self.flights)
+        study = run_study(runs, seed, noise, self.flights, folder / "scenarios")
         study.write(folder)
         caption = (
             "A flight with the seed of the study; dashed lines: a fault begins. Tables: scenarios.txt, scenario_*.csv."

@@ -22,7 +22,9 @@ from aircraft.missile.isolability import isolability_table
 from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
 from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scenario, locked, noise_set, thrust_loss
 from aircraft.missile.sequence import isolate_in_order
-from svo.store import write_csv, write_text
+from svo.store import Identity, Parts, versions, write_csv, write_text
+from svo.store import locked as alone_in
+from svo.store.tables import Json
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -105,27 +107,40 @@ class ScenarioStudy:
         write_text(folder / "scenarios.txt", self.to_text() + "\n")
 
 
-def run_study(runs: int, seed: int, noises: Sequence[str], flights: Flights | None = None) -> ScenarioStudy:
+def run_study(
+    runs: int, seed: int, noises: Sequence[str], flights: Flights | None = None, keep: Path | None = None
+) -> ScenarioStudy:
     """Fly every scenario, every magnitude, and without a fault, ``runs`` times with each noise set.
+
+    Rows that stand in the folder ``keep`` are not computed again; it is made if need be.
 
     Raises
     ------
     ValueError
-        If ``runs`` is below one or a noise set is not known.
+        If ``runs`` is below one, a noise set is not known, or another process is at work in ``keep``.
     """
     if runs < 1:
         raise ValueError(f"runs is {runs}; expected at least 1")
     simulator = Flights() if flights is None else flights
-    cases = {HEALTHY: Scenario((), TABLE_1)} | {f"scenario {i}": s for i, s in SCENARIOS.items()} | MAGNITUDES
-    rows: list[ResidualRow] = []
-    orders: list[OrderRow] = []
-    for noise in noises:
-        for i, child in enumerate(np.random.SeedSequence(seed).spawn(runs)):
-            for name, scenario in cases.items():
-                run = simulator.run(scenario.faults, noise_set(noise), child)
-                rows += _residual_rows(simulator, run, scenario, name, noise, i)
-                orders.append(_order_row(simulator, run, scenario, name, noise, i))
-    return ScenarioStudy(tuple(rows), tuple(orders))
+    tasks = [(noise, i, c) for noise in noises for i, c in enumerate(np.random.SeedSequence(seed).spawn(runs))]
+    if keep is None:
+        return _joined([_fly(simulator, *task) for task in tasks])
+    configuration = {"runs": runs, "seed": seed, "noises": list(noises), "model_error": simulator.model_error}
+    study = Identity("missile-scenarios-1", configuration, versions()).digest
+    keep.mkdir(parents=True, exist_ok=True)
+    residual_parts = Parts(keep / "residuals", ResidualRow, study, Json())
+    order_parts = Parts(keep / "orders", OrderRow, study, Json())
+    with alone_in(keep):
+        residual_parts.make()
+        order_parts.make()
+        done = residual_parts.survey().intact.keys() & order_parts.survey().intact.keys()
+        for number, task in enumerate(tasks):
+            if number not in done:
+                flown = _fly(simulator, *task)
+                residual_parts.write(number, flown.residuals)
+                order_parts.write(number, flown.orders)
+    numbers = range(len(tasks))
+    return ScenarioStudy(tuple(residual_parts.rows(numbers)), tuple(order_parts.rows(numbers)))
 
 
 def fixed_alarms(time: Array, values: Array) -> Flags:
@@ -149,6 +164,24 @@ def signature_text(simulator: Flights) -> str:
         f"{name:<16}" + "  ".join(f"{int(on):>3}" for on in row) for name, row in zip(TABLE_1, signature, strict=True)
     ]
     return "\n".join(lines) + "\n\n" + isolability_table(signature, TABLE_1).to_text()
+
+
+def _fly(simulator: Flights, noise: str, seed: int, child: np.random.SeedSequence) -> ScenarioStudy:
+    """One flight of every case."""
+    cases = {HEALTHY: Scenario((), TABLE_1)} | {f"scenario {i}": s for i, s in SCENARIOS.items()} | MAGNITUDES
+    rows: list[ResidualRow] = []
+    orders: list[OrderRow] = []
+    for name, scenario in cases.items():
+        run = simulator.run(scenario.faults, noise_set(noise), child)
+        rows += _residual_rows(simulator, run, scenario, name, noise, seed)
+        orders.append(_order_row(simulator, run, scenario, name, noise, seed))
+    return ScenarioStudy(tuple(rows), tuple(orders))
+
+
+def _joined(flown: Sequence[ScenarioStudy]) -> ScenarioStudy:
+    return ScenarioStudy(
+        tuple(row for part in flown for row in part.residuals), tuple(row for part in flown for row in part.orders)
+    )
 
 
 def _residual_rows(
@@ -249,13 +282,16 @@ def main(
     seed: Annotated[int, typer.Option(min=0, help="Seed that all flights' seeds are spawned from.")] = 0,
     model_error: Annotated[float, typer.Option(help="Largest relative error of the force coefficients.")] = 0.0,
 ) -> None:
-    """Fly the missile's scenarios over many seeds; write tables and pictures, and print the tables."""
+    """Fly the missile's scenarios over many seeds; write tables and pictures, and print the tables.
+
+    Flights that stand in OUT/scenarios, of the same study with the same software, are not flown again.
+    """
     from aircraft.missile.figures import write_figures
     from aircraft.missile.imu import NOISE_SETS
 
     out.mkdir(parents=True, exist_ok=True)
     flights = Flights(model_error=model_error)
-    study = run_study(runs, seed, tuple(NOISE_SETS), flights)
+    study = run_study(runs, seed, tuple(NOISE_SETS), flights, out / "scenarios")
     study.write(out)
     write_figures(out, flights, seed)
     typer.echo(study.to_text())

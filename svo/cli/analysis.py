@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from svo.cli.destinations import writable_csv, writable_folder
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, one_line_errors, plant_to_simulate
+from svo.cli.frame import KEPT, PREPARING, announce, app, chosen_noise, one_line_errors, plant_to_simulate
 from svo.cli.options import AsJson, FaultSize, FlightSeed, NoiseName, PlantName, finite
 from svo.cli.output import print_isolability, print_json
 
@@ -121,6 +121,9 @@ def compare(
         list[str] | None,
         typer.Option(metavar="NAME", help="bounded or gaussian noise; may be repeated. [default: both]"),
     ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the same comparison in DIR after an interruption.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Set detectors side by side: the same runs, the same optimiser, the same false-alarm rate, other seeds to judge.
@@ -133,7 +136,7 @@ def compare(
       svo compare eclipse --runs 50 --seed 0 --workers 2 --out comparison
       svo compare elevator --noise quiet --runs 20 --healthy-runs 50 --out comparison
     """
-    with one_line_errors():
+    with one_line_errors(KEPT):
         from dataclasses import replace
 
         from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
@@ -151,7 +154,7 @@ def compare(
             comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
         announce(PREPARING)
         with progress("Parts") as update:
-            compared = run_comparison(comparison, workers, update)
+            compared = run_comparison(comparison, workers, update, out=out, resume=resume)
         rows = publish_comparison(out, compared, the_plant)
         if as_json:
             print_json([row.to_dict() for row in rows])

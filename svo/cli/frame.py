@@ -36,12 +36,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+KEPT = "interrupted; what is done is kept, and the same command with --resume goes on"
 PREPARING = "Preparing compiled code (about a minute the first time, then kept)"
 
 
 @contextmanager
-def one_line_errors() -> Iterator[None]:
-    """What a user can cause becomes one line on standard error and exit code 1, and notes on logs a line each."""
+def one_line_errors(interrupted: str = "interrupted") -> Iterator[None]:
+    """What a user can cause becomes one line on standard error and exit code 1, and notes on logs a line each.
+
+    ``interrupted`` is what to say after Ctrl-C.
+    """
     try:
         with _notes_in_lines():
             yield
@@ -54,7 +58,7 @@ def one_line_errors() -> Iterator[None]:
     except MemoryError as error:
         fail(f"not enough memory ({error}); take a shorter horizon, or fewer samples or workers")
     except KeyboardInterrupt:
-        fail("interrupted; the runs of a study that are done are kept, and --resume goes on", code=130)
+        fail(interrupted, code=130)
 
 
 @contextmanager

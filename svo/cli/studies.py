@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from svo.cli.destinations import writable_folder, writable_log
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, note, one_line_errors, plant_to_simulate
+from svo.cli.frame import KEPT, PREPARING, announce, app, chosen_noise, note, one_line_errors, plant_to_simulate
 from svo.cli.options import AsJson, NoiseName, PlantName
 from svo.cli.output import describe, print_detector_study, print_json, print_study
 
@@ -95,7 +95,7 @@ def study(
       svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
       svo study elevator --runs 200 --seed 0 --out results
     """
-    with one_line_errors():
+    with one_line_errors(KEPT):
         _need_study_extra()
         from svo.interval.study import LearnsDetectors
         from svo.progress import progress

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import functools
-import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from svo.comparison.detector import Detector, Kind, Setting
 from svo.comparison.run import ComparedRun, Condition, compare_run
+from svo.comparison.store import TunedRow, comparison_parts
 from svo.comparison.tuning import FaultyRun, Tuned, tune
 from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, load_plant
+from svo.store import Parts
+from svo.store.parts import Row
+from svo.study.processes import worker_processes
 
 Progress = Callable[[int, int], None]
 DISTRIBUTIONS: tuple[Distribution, ...] = ("bounded", "gaussian")
@@ -107,15 +110,35 @@ class Compared:
         return [tuned.setting for (of, _), tuned in self.tuned.items() if of == distribution]
 
 
-def run_comparison(comparison: Comparison, workers: int = 1, progress: Progress | None = None) -> Compared:
+def run_comparison(
+    comparison: Comparison,
+    workers: int = 1,
+    progress: Progress | None = None,
+    *,
+    out: str | Path | None = None,
+    resume: bool = False,
+) -> Compared:
     """Tune every detector on training seeds and judge it on others.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    workers : int
+        Number of processes; 1 runs in this one.
+    progress : callable, optional
+        Called with (tasks done, tasks in all).
+    out : path, optional
+        A folder that keeps what each task gave, so that an interrupted comparison can go on.
+    resume : bool
+        Go on with the comparison in ``out``.
 
     Raises
     ------
     TypeError
         If the plant offers no comparison.
     ValueError
-        If a noise set is unknown, detectors share a name, or ``workers`` is below 1.
+        If a noise set is unknown, detectors share a name, ``workers`` is below 1, or the folder cannot be used (see
+        `svo.comparison.store.comparison_parts`).
     """
     if workers < 1:
         raise ValueError(f"workers is {workers}; expected at least 1 process")
@@ -127,12 +150,14 @@ def run_comparison(comparison: Comparison, workers: int = 1, progress: Progress 
     tunings = [(distribution, index) for distribution in comparison.distributions for index in range(len(names))]
     parts = list(comparison.parts())
     counted = functools.partial(_counted, progress, len(tunings) + len(parts))
-    with _pool(min(workers, max(len(tunings), len(parts)))) as submit:
-        found = counted(0, _results(submit, tune_detector, [(comparison, *task) for task in tunings]))
-        for (distribution, index), tuned in zip(tunings, found, strict=True):
-            compared.tuned[distribution, names[index]] = tuned
+    kept = nullcontext() if out is None else comparison_parts(Path(out), comparison, resume)
+    with kept as keep, _pool(min(workers, max(len(tunings), len(parts)))) as submit:
+        tasks: list[tuple[Any, ...]] = [(comparison, *task) for task in tunings]
+        found = counted(0, _results(submit, _tuned_rows, tasks, keep.tuned if keep else None))
+        for (distribution, index), (row,) in zip(tunings, found, strict=True):
+            compared.tuned[distribution, names[index]] = row.tuned()
         tasks = [(comparison, part, compared.settings(part.distribution)) for part in parts]
-        for rows in counted(len(tunings), _results(submit, judge, tasks)):
+        for rows in counted(len(tunings), _results(submit, judge, tasks, keep.judged if keep else None)):
             compared.rows.extend(rows)
     order = {key: place for place, key in enumerate(compared.tuned)}
     compared.rows.sort(key=lambda row: order[row.distribution, row.detector])  # stable: scenarios and seeds keep theirs
@@ -211,19 +236,31 @@ def _pool(workers: int) -> Iterator[Submit]:
     if workers == 1:
         yield functools.partial
         return
-    # Spawned, not forked: a fork would copy the locks of threads that run in this process.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        try:
-            yield lambda *call: pool.submit(*call).result
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)  # do not go on with what nobody waits for
-            raise
+    with worker_processes(workers, finish=False) as pool:  # a task may take minutes
+        yield lambda *call: pool.submit(*call).result
 
 
-def _results(submit: Submit, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
-    """In the order of the tasks, whatever is done first."""
-    for result in [submit(function, *task) for task in tasks]:
-        yield result()
+def _results(
+    submit: Submit, function: Callable[..., list[Row]], tasks: Sequence[tuple[Any, ...]], keep: Parts[Row] | None
+) -> Iterator[list[Row]]:
+    """The rows of each task, in the order of the tasks; of those that are kept, without doing them again."""
+    done = set() if keep is None else set(keep.survey().intact)
+    results = {
+        place: submit(_kept, keep, place, function, task) for place, task in enumerate(tasks) if place not in done
+    }
+    for place in range(len(tasks)):
+        yield results[place]() if place in results else keep.rows([place])  # type: ignore[union-attr]
+
+
+def _kept(keep: Parts[Row] | None, place: int, function: Callable[..., list[Row]], task: tuple[Any, ...]) -> list[Row]:
+    rows = function(*task)
+    if keep is not None:
+        keep.write(place, rows)
+    return rows
+
+
+def _tuned_rows(comparison: Comparison, distribution: Distribution, index: int) -> list[TunedRow]:
+    return [TunedRow.of(tune_detector(comparison, distribution, index))]
 
 
 def _counted(progress: Progress | None, total: int, done: int, results: Iterator[Any]) -> Iterator[Any]:

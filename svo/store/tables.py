@@ -57,12 +57,17 @@ class Json:
     suffix = ".jsonl"
 
     def encode(self, rows: Sequence[Any], row: type[Any], seal: Seal, metadata: Mapping[str, str]) -> bytes:
-        lines = [seal.blank(), *(json.dumps(asdict(r)) for r in rows)]
+        lines = [seal.blank(), *(json.dumps(asdict(r), default=_plain) for r in rows)]
         return sealed("".join(line + "\n" for line in lines).encode())
 
     def decode(self, paths: Sequence[Path], row: type[Any]) -> list[Any]:
         lines = [line for path in paths for line in path.read_text(encoding="utf-8").splitlines()[1:]]
         return [_row(row, json.loads(line)) for line in lines]
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy as one of Python."""
+    return value.item()
 
 
 def _row(row: type[Any], values: Mapping[str, Any]) -> Any:

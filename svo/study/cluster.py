@@ -14,7 +14,8 @@ from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from svo.study.configuration import Job, StudyConfiguration, versions
+from svo.store import versions
+from svo.study.configuration import Job, StudyConfiguration
 from svo.study.run import run_registered
 from svo.study.store import StudyFolder
 

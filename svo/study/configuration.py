@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from svo.plant import HEALTHY, MonitoredPlant, Plant, architecture_of, in_architecture
-
-_PACKAGES = ("svo-fdi", "numpy", "scipy", "numba", "highspy", "python-flint", "pyarrow")
 
 
 @dataclass(frozen=True)
@@ -193,20 +187,3 @@ def check_fault(plant: Plant, fault: str, profile: str | None = None) -> None:
         )
     if profile is not None and profile not in plant.faults[fault]:
         raise ValueError(f"fault {fault!r} has no profile {profile!r}; it has {', '.join(plant.faults[fault])}")
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Versions of the software and the kind of machine, for the record."""
-    return {
-        **{name: _version(name) for name in _PACKAGES},
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
-    }
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "not installed"

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from time import perf_counter
@@ -16,6 +12,7 @@ import polytopes
 from svo.plant import HEALTHY, Plant
 from svo.study.cluster import on_cluster
 from svo.study.configuration import Job, StudyConfiguration
+from svo.study.processes import worker_processes
 from svo.study.run import registered_plant, run_registered
 from svo.study.store import StudyFolder
 
@@ -106,43 +103,25 @@ def _here(configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job
 def _in_processes(
     configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job], workers: int
 ) -> Iterator[int]:
-    # Spawned, not forked: a fork would copy the locks of threads that run in this process.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
     waiting = iter(jobs)
     running: set[Future[int]] = set()
     try:
-        while True:
-            # Few runs are handed out ahead, so that an interruption does not leave a long queue.
-            for job in waiting:
-                running.add(pool.submit(_run, configuration, folder, job))
-                if len(running) >= 2 * workers:
-                    break
-            if not running:
-                return
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                yield future.result()
+        with worker_processes(workers) as pool:
+            while True:
+                # Few runs are handed out ahead, so that an interruption does not leave a long queue.
+                for job in waiting:
+                    running.add(pool.submit(_run, configuration, folder, job))
+                    if len(running) >= 2 * workers:
+                        break
+                if not running:
+                    return
+                done, running = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
     except BrokenProcessPool as error:
         raise RuntimeError(
             "a worker process died (killed, or out of memory); the runs that are done are kept, resume to go on"
         ) from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _start_worker() -> None:
-    # An interruption from the keyboard reaches all processes; the parent ends the workers after their runs.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """Workers of a killed parent would wait for work for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _run(configuration: StudyConfiguration, folder: StudyFolder, job: Job) -> int:

@@ -6,26 +6,23 @@ digests it holds. Parts that are damaged, copied, or of another study are found 
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic
 
 from svo.alarms import write_alarms
-from svo.store import Joined, Parts, Survey, digest_of, locked, write_text, write_whole
+from svo.store import Identity, Joined, Parts, Survey, digest_of, locked, versions, write_whole
 from svo.store.lock import check_free
 from svo.store.parts import Row, part_name
-from svo.study.configuration import StudyConfiguration, versions
+from svo.study.configuration import StudyConfiguration
 from svo.study.exemplar import Exemplar
 from svo.study.run import RunOutcome, RunRow
 
 FORMAT = "svo-study-2"
 _ALARMS, _EXEMPLAR = "alarms", "exemplar"  # what belongs to a run beside its rows
-_NOT_COMPARED = "machine"
-_LARGEST_IDENTITY = 1_000_000  # bytes
 _SHOWN = 5
 
 
@@ -73,7 +70,7 @@ class StudyStore(Generic[Row]):
         with locked(self.path):
             self._check_content(configuration, resume)
             if not self._identity.exists():
-                write_text(self._identity, json.dumps(_identity(configuration), indent=2) + "\n")
+                _identity(configuration).write(self._identity)
             self._parts().make()
             self._joined.make()
             self._exemplars.mkdir(exist_ok=True)
@@ -142,24 +139,14 @@ class StudyStore(Generic[Row]):
         ValueError
             If the folder has no ``study.json``, or not that of a study of this version.
         """
+        return asdict(self._stored())
+
+    def _stored(self) -> Identity:
         if not self._identity.is_file():
             raise ValueError(f"{self.path} holds no study (study.json is missing); expected a folder of svo study")
-        if self._identity.stat().st_size > _LARGEST_IDENTITY:
-            raise ValueError(f"{self._identity} is not that of a study; it has more than {_LARGEST_IDENTITY} bytes")
+        stored = Identity.read(self._identity, FORMAT)
         try:
-            stored = json.loads(self._identity.read_text(encoding="utf-8"))
-        except (ValueError, RecursionError) as error:
-            raise ValueError(f"{self._identity} is not that of a study; it is no JSON ({error})") from error
-        if not (isinstance(stored, dict) and isinstance(stored.get("configuration"), dict)):
-            raise ValueError(f"{self._identity} is not that of a study; expected an object with a configuration")
-        if stored.get("format") != FORMAT:
-            raise ValueError(
-                f"{self._identity} has the format {stored.get('format')!r}, that of another version of svo; expected "
-                f"{FORMAT!r}, so run the study anew into another folder"
-            )
-        try:
-            StudyConfiguration.from_dict(stored["configuration"])
-            _check_versions(stored.get("versions"))
+            StudyConfiguration.from_dict(stored.configuration)
         except ValueError as error:
             raise ValueError(f"{self._identity} is not that of a study: {error}") from error
         return stored
@@ -167,8 +154,8 @@ class StudyStore(Generic[Row]):
     def _survey(self) -> Survey:
         return self._parts().survey()
 
-    def _parts(self, identity: Mapping[str, Any] | None = None) -> Parts[Row]:
-        return Parts(self.parts, self.row, _digest(self.identity() if identity is None else identity))
+    def _parts(self, identity: Identity | None = None) -> Parts[Row]:
+        return Parts(self.parts, self.row, (identity or self._stored()).digest)
 
     @property
     def _joined(self) -> Joined:
@@ -210,19 +197,7 @@ class StudyStore(Generic[Row]):
             raise ValueError(
                 f"{self.path} is not empty and holds no study (study.json is missing); choose another folder"
             )
-        stored = self.identity()
-        was = stored["configuration"] | stored["versions"]
-        now = configuration.to_dict() | versions()
-        different = [
-            f"{key} was {was.get(key)!r}, now {now[key]!r}"
-            for key in now
-            if key != _NOT_COMPARED and was.get(key) != now[key]
-        ]
-        if different:
-            raise ValueError(
-                f"{self.path} holds another study ({'; '.join(different)}); "
-                "resume with the same configuration and versions, or choose another folder"
-            )
+        self._stored().check_same(_identity(configuration), self.path)
 
 
 @dataclass(frozen=True)
@@ -242,20 +217,8 @@ class StudyFolder(StudyStore[RunRow]):
         self.store(run, [outcome.row], configuration, attached)
 
 
-def _identity(configuration: StudyConfiguration) -> dict[str, Any]:
-    return {"format": FORMAT, "configuration": configuration.to_dict(), "versions": versions()}
-
-
-def _digest(identity: Mapping[str, Any]) -> str:
-    """What all parts of a study agree on, on any machine."""
-    software = {name: version for name, version in identity["versions"].items() if name != _NOT_COMPARED}
-    text = json.dumps([identity["format"], identity["configuration"], software], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _check_versions(versions: Any) -> None:
-    if not (isinstance(versions, dict) and all(isinstance(value, str) for value in versions.values())):
-        raise ValueError("versions is no object of texts")
+def _identity(configuration: StudyConfiguration) -> Identity:
+    return Identity(FORMAT, configuration.to_dict(), versions())
 
 
 def _digests(seals: Mapping[int, Any], kind: str) -> dict[int, str]:

@@ -7,11 +7,9 @@ front of each reason is the point of the list of faults found by use.
 from __future__ import annotations
 
 import copy
-import os
 import pickle
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -67,40 +65,6 @@ def test_a_watch_shows_the_alarm_of_a_polytope_observer() -> None:
     observer.update([0.0])
     step = observer.step([1.0], [9.0])
     assert "falsified" in alarm_text(Alarm("nominal", 1, 0.1, step.certificate, {}))
-
-
-@pytest.mark.slow
-@later("B2", AssertionError, "workers of a killed study of the elevator stay for ever")
-def test_workers_of_a_killed_study_end(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "svo", "study", "elevator", "--runs", "60", "--workers", "2", "--out"]
-    process = subprocess.Popen([*command, str(tmp_path / "out")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    workers: list[int] = []
-    end = time.monotonic() + 120.0
-    while len(workers) < 2 and process.poll() is None and time.monotonic() < end:
-        time.sleep(0.1)
-        workers = _workers_of(process.pid)
-    process.kill()
-    process.wait()
-    end = time.monotonic() + 30.0
-    while any(map(_is_alive, workers)) and time.monotonic() < end:
-        time.sleep(0.1)
-    left = [pid for pid in workers if _is_alive(pid)]
-    for pid in left:
-        os.kill(pid, 9)
-    assert len(workers) >= 2
-    assert left == []
-
-
-def _workers_of(parent: int) -> list[int]:
-    found = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    return [int(pid) for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-
-
-def _is_alive(pid: int) -> bool:
-    try:
-        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
-    except FileNotFoundError:
-        return False
 
 
 @later("B12", RuntimeError, "one failing run makes a study unfinishable")

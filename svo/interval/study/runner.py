@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-import multiprocessing
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ from typing import Any
 from svo.interval.study.run import DetectorRow, LearnsDetectors, execute
 from svo.study.cluster import outcomes_on_cluster
 from svo.study.configuration import Job, StudyConfiguration
+from svo.study.processes import worker_processes
 from svo.study.run import failure_named, registered_plant
 from svo.study.store import StudyStore
 
@@ -76,8 +75,7 @@ def _results(name: str, jobs: list[Job], workers: int, scheduler: str | None) ->
     if workers == 1 or len(jobs) < 2:
         yield from map(work, jobs)
         return
-    # Spawned, not forked: a fork would copy the locks of threads that run in this process.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+    with worker_processes(workers) as pool:
         yield from pool.map(work, jobs, chunksize=4)
 
 

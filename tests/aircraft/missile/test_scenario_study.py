@@ -77,3 +77,23 @@ def test_pictures_are_written(tmp_path: Path) -> None:
     written = write_figures(tmp_path, Flights(), 0)
     assert len(written) == 4
     assert all(path.stat().st_size > 10_000 for path in written.values())
+
+
+def test_flights_that_are_kept_are_not_flown_again(
+    study: ScenarioStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown = []
+
+    def fly(simulator: Flights, noise: str, seed: int, child: np.random.SeedSequence) -> ScenarioStudy:
+        flown.append(seed)
+        return ScenarioStudy(*(tuple(r for r in rows if r.seed == seed) for rows in (study.residuals, study.orders)))
+
+    monkeypatch.setattr("aircraft.missile.scenario_study._fly", fly)
+    assert run_study(2, 0, ("gaussian",), keep=tmp_path) == study
+    assert flown == [0, 1]
+    part = tmp_path / "orders" / "run-000001.jsonl"
+    part.write_bytes(part.read_bytes()[:-1])
+    assert run_study(2, 0, ("gaussian",), keep=tmp_path) == study
+    assert flown == [0, 1, 1]
+    run_study(2, 1, ("gaussian",), keep=tmp_path)  # another study: nothing of this one counts
+    assert flown == [0, 1, 1, 0, 1]

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -144,3 +148,36 @@ def test_the_command_prints_table_1(tmp_path: Path) -> None:
     assert "DV1: runaway -5 deg/s" in answer.output
     assert "paper 50.05" in answer.output
     assert (tmp_path / "out" / "report.html").exists()
+
+
+@pytest.mark.slow
+def test_workers_of_a_killed_study_end(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "svo", "study", "elevator", "--runs", "60", "--workers", "2", "--out"]
+    process = subprocess.Popen([*command, str(tmp_path / "out")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    workers: list[int] = []
+    end = time.monotonic() + 120.0
+    while len(workers) < 2 and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.1)
+        workers = _workers_of(process.pid)
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 30.0
+    while any(map(_is_alive, workers)) and time.monotonic() < end:
+        time.sleep(0.1)
+    left = [pid for pid in workers if _is_alive(pid)]
+    for pid in left:
+        os.kill(pid, 9)
+    assert len(workers) >= 2
+    assert left == []
+
+
+def _workers_of(parent: int) -> list[int]:
+    found = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    return [int(pid) for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
+    except FileNotFoundError:
+        return False
