@@ -26,7 +26,7 @@ def exact_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Progra
         return None
     rows = integer_form(A, b, C, d)
     plain = short(rows.inequalities) and short(rows.equalities)
-    if not plain and (b.size + d.size > _LONG_ROWS or _decidable(program)):
+    if not plain and (b.size + d.size > _LONG_ROWS or wide(program)):
         return None
     try:
         return generators_of(rows, SHORT_RAYS if plain else LONG_RAYS)
@@ -39,7 +39,7 @@ def integer_form(A: Floats, b: Floats, C: Floats, d: Floats) -> ExactRows:
     return ExactRows(integer_rows(np.hstack([A, b[:, None]])), integer_rows(np.hstack([C, d[:, None]])))
 
 
-def _decidable(program: Program) -> bool:
+def wide(program: Program) -> bool:
     """Whether floats know the set well: full-dimensional, wide against their rounding, bounded."""
     axes = np.eye(program.flat.dim)
     if program.flat.pivots or not program.fat or program.interior.radius <= _WIDE * program.size:

@@ -122,6 +122,9 @@ def _ascend(
         sign = 1 if slots[slot] is None and y[0, q + slot] > 0 else -1
         edge = fmpq_mat(n, 1, [sign * inverse[j, q + slot] for j in range(n)])
         row, step = _block(A * edge, b - A * x, slots)
+        if row is None and strictly is not None:  # the value wanted is reached somewhere along the edge
+            x = x + edge * ((1 - value) / (c * edge)[0, 0])
+            return ExactOutcome("reached", _column(x), fmpq(1), {})
         if row is None:
             return ExactOutcome("unbounded", _column(x), value, {})
         x, slots[slot], degenerate = x + edge * step, row, step == 0

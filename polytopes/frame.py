@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 Oracle = Callable[[Floats], Floats]  # directions (k, n) -> a maximiser for each, (k, n)
 _EVEN = 0.05  # smallest spread of the support points at which the axes are good enough
 _NOISE = 1e-15  # width, relative to the coordinates of the points, below which it is rounding
+_HUGE = 1e100  # entries of rows from which, and from whose reciprocal, coordinates are not about the set
 _ROUND = 0.02  # radius of a largest ball in coordinates that are good enough
 
 
@@ -80,7 +81,8 @@ def unit_body(A: Floats, b: Floats, inner: Floats) -> UnitBody | None:
     centre, axes = inner, np.eye(n)
     rows, rhs = substituted(A, b, centre, axes)
     for _ in range(6):
-        body = _measured(rows, rhs)
+        sizes = np.abs(rows).max(axis=1)
+        body = _measured(rows, rhs) if ((sizes > 1.0 / _HUGE) & (sizes < _HUGE)).all() else None
         if body is None:
             return None
         point, turn, radius = body

@@ -24,6 +24,7 @@ from polytopes.redundancy import minimal_rows
 from polytopes.rows import Rows, same_space
 from polytopes.support import Ball, SupportResult
 from polytopes.vertices import vertices
+from polytopes.volume import volume
 
 Floats = NDArray[np.float64]
 
@@ -247,7 +248,7 @@ class HPolytope(Rows):
 
     def volume(self) -> float:
         """n-dimensional volume: 0 for flat and empty sets, inf for unbounded full-dimensional ones (as `vertices`)."""
-        return sampling.volume(self)
+        return volume(self)
 
     def random_points(self, count: int, rng: np.random.Generator) -> Floats:
         """Points (count, n) of a bounded set, close to uniform: hit-and-run, 20 n steps of O(m n) between two points.

@@ -58,10 +58,11 @@ def hull_normals(V: Floats) -> tuple[Floats, Floats]:
 def nearly_flat(V: Floats, rays: Floats) -> Floats:
     """Unit normals of the subspace that points (k, n) and rays (r, n) lie within 1e-12 of their spread of.
 
-    The rays are taken to be about as long as the points are spread.
+    The rays are taken to be about as long as the points are spread, or, where that is rounding, as they are large.
     """
     longest = np.abs(rays).max(axis=1, keepdims=True)
-    spread = np.ptp(V, axis=0).max() or 1.0
+    spread, size = np.ptp(V, axis=0).max(), np.abs(V).max()
+    spread = (spread if spread > _FLAT * size else size) or 1.0
     ahead = V.mean(axis=0) + rays / np.where(longest > 0.0, longest, 1.0) * spread
     both = np.vstack([V, ahead])
     scale = axis_scales(both)

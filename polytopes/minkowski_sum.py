@@ -23,9 +23,9 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
     """Rows A, b, C, d of the sum.
 
     In integers, the hull of all sums of vertices and of all rays and lines, where both sets are computed with in
-    integers or one is unbounded.  Else both are bounded and one is full-dimensional: elimination of y from
-    ``{(z, y) : z - y in P, y in Q}`` gives the normals a while that is cheap, then the sums of vertices do (half the
-    time of the hull of support points where both were measured); ``h_P(a) + h_Q(a)`` is rounded up.
+    integers or one is unbounded.  Else elimination of y from ``{(z, y) : z - y in P, y in Q}`` tells the normals, as
+    long as that is cheap and no set thin, then the sums of vertices do (half the time of the hull of support points
+    where both were measured); ``h_P(a) + h_Q(a)`` is rounded up.
 
     Raises
     ------
@@ -47,16 +47,20 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
 def _normals(P: Rows, Q: Rows) -> Floats:
     """Normals of the facets of a bounded sum, and of a subspace that it nearly lies in."""
     n = P.dim
+    try:
+        if P.wide and Q.wide:
+            return _normals_by_elimination(P, Q)
+    except ProjectionLimitError:
+        pass
+    sums = vertices(P)[:, None, :] + vertices(Q)
+    facets, across = hull_normals(sums.reshape(-1, n))
+    return np.vstack([facets, across, -across])
+
+
+def _normals_by_elimination(P: Rows, Q: Rows) -> Floats:
+    n = P.dim
     lifted = Rows(
         np.vstack([np.hstack([P.A, -P.A]), np.hstack([np.zeros((Q.b.size, n)), Q.A])]),
         np.concatenate([P.b, Q.b]),
-        np.vstack([np.hstack([P.C, -P.C]), np.hstack([np.zeros((Q.d.size, n)), Q.C])]),
-        np.concatenate([P.d, Q.d]),
     )
-    try:
-        A, _, C, _ = project(lifted, range(n), "fourier-motzkin", _CHEAP_ROWS, False)
-        return np.vstack([A, C, -C])
-    except ProjectionLimitError:
-        sums = vertices(P)[:, None, :] + vertices(Q)
-        facets, across = hull_normals(sums.reshape(-1, n))
-        return np.vstack([facets, across, -across])
+    return project(lifted, range(n), "fourier-motzkin", _CHEAP_ROWS, False)[0]

@@ -52,6 +52,24 @@ def upper_supports(P: Rows, directions: Floats, uncertain: Floats | None = None)
     return bounds
 
 
+def lower_supports(P: Rows, directions: Floats) -> Floats:
+    """Lower bounds (k,) of the supports of a wide set along directions (k, n), a little below them.
+
+    A point that floats found best breaks rows by rounding; drawn towards the centre of a largest ball, it breaks none.
+    """
+    best = maxima(P, directions)
+    assert best is not None
+    centre, unit = P.program.interior.point, (P.dim + 3) * _EPS
+    rounding = unit * (np.abs(best.points) @ np.abs(P.A.T) + np.abs(P.b))
+    broken = np.maximum(best.points @ P.A.T - P.b, 0.0) + rounding
+    room = np.maximum(P.b - P.A @ centre - unit * (np.abs(P.A) @ np.abs(centre) + np.abs(P.b)), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        back = np.where(P.A.any(axis=1), broken / (broken + room), 0.0).max(axis=1, initial=0.0)
+    values, sizes = (directions * best.points).sum(axis=1), (np.abs(directions) * np.abs(best.points)).sum(axis=1)
+    drawn = values - back * np.maximum(values - directions @ centre, 0.0)
+    return np.asarray(drawn - 3.0 * unit * (np.abs(directions) @ np.abs(centre) + sizes))
+
+
 def reach(P: Rows, moved: Floats | None = None) -> Floats | None:
     """Bounds (n,) of |x| over a nonempty set; None if none is proved.
 

@@ -7,10 +7,10 @@ the facets of its shadow along the slab.
 """
 
 import numpy as np
-from flint import fmpz_mat
+from flint import fmpq_mat, fmpz_mat
 from numpy.typing import NDArray
 
-from polytopes.double_description import Integers
+from polytopes.double_description import Integers, null_space, primitive
 from polytopes.hull import nearly_flat
 from polytopes.integers import are_floats, as_floats, floats_of_directions, floats_of_points, integer_rows
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, rows_of, shadow, stacked
@@ -40,12 +40,34 @@ def float_rows(generators: ExactGenerators) -> Table:
 
 def _near_rows(generators: ExactGenerators, inequalities: Integers, equalities: list[list[int]]) -> Table:
     """Exact rows where they are floats, and outward ones elsewhere."""
-    normals = OutwardNormals(generators, inequalities[:, :-1])
+    lines = null_space(stacked(inequalities, *(np.array([row], dtype=object) for row in equalities))[:, :-1])[0]
+    whole = ExactGenerators(generators.vertices, generators.rays, lines)  # rays may hold lines, as r and -r
+    along, flat = _along(inequalities[:, :-1], equalities), all(map(are_floats, equalities))
+    normals = OutwardNormals(whole, along)
     exact = [as_floats(row, row[:-1]) for row in equalities if are_floats(row)]
     pairs = [sign * v for row in equalities if not are_floats(row) for sign in (1, -1) for v in row[:-1]]
     sides = np.array(pairs, dtype=object).reshape(-1, generators.dim).tolist()
-    rows = [as_floats(row, row[:-1]) if are_floats(row) else normals.row(row[:-1]) for row in inequalities.tolist()]
+    rows = [
+        as_floats(row, row[:-1]) if flat and are_floats(row) else normals.row(normal)
+        for row, normal in zip(inequalities.tolist(), along, strict=True)
+    ]
     return _table(rows + [normals.row(side) for side in sides], exact, generators.dim)
+
+
+def _along(normals: Integers, equalities: list[list[int]]) -> list[list[int]]:
+    """The parts of normals along the subspace of equalities.
+
+    A normal may have any multiple of an equality's in it, even be nearly parallel to it, and then rounding is all that
+    is left of its own.
+    """
+    if not equalities:
+        return list(normals.tolist())
+    table, m, n = [row[:-1] for row in equalities], len(normals), normals.shape[1]
+    C, N = fmpz_mat(table), fmpz_mat(m, n, normals.ravel().tolist())
+    across, denominator = (fmpq_mat(C * C.transpose()).inv() * fmpq_mat(C * N.transpose())).numer_denom()
+    parts = denominator * N - across.transpose() * C
+    whole = np.array([int(v) for v in parts.entries()], dtype=object).reshape(m, n)
+    return list(primitive(whole).tolist())
 
 
 def _table(inequalities: list[Floats], equalities: list[Floats], n: int) -> Table:
@@ -69,7 +91,7 @@ def _slab(generators: ExactGenerators, across: Floats) -> Table:
     A, b, C, d = float_rows(shadow(generators, kept))
     facets, fixed = np.zeros((len(A), n)), np.zeros((len(C), n))
     facets[:, kept], fixed[:, kept] = A, C
-    normals = OutwardNormals(generators, integer_rows(facets))
+    normals = OutwardNormals(generators, integer_rows(facets).tolist())
     sides = [normals.row(side) for row in integer_rows(across).tolist() for side in (row, [-v for v in row])]
     slab, _, _, _ = _table(sides, [], n)
     return np.vstack([facets, slab]), np.append(b, [side[-1] for side in sides]), fixed, d

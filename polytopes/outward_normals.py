@@ -2,7 +2,8 @@
 
 A row whose normal is rounded holds all over a set if its right-hand side is the support along the rounded normal,
 which must not rise along a ray or change along a line.  So normals are rounded within those that vanish on the lines,
-and tilted a little towards one that falls along every ray if they rise along one.
+and tilted a little towards one that falls along every ray if they rise along one.  Where lines leave no room for that
+(their integers are too long) the row holds for the part of the set within 2^10 times the size of its vertices.
 """
 
 from fractions import Fraction
@@ -13,12 +14,14 @@ from flint import fmpz_mat
 from numpy.typing import NDArray
 
 from polytopes.double_description import Integers, null_space
-from polytopes.integers import Floats, are_floats, as_floats, up, whole_numbers
+from polytopes.integers import Floats, are_floats, as_floats, floats_of_points, up, whole_numbers
 from polytopes.minkowski_weyl import ExactGenerators
 
 _BITS = 53  # of a float
 _TILTS = (0, 50, 46, 42, 38, 34, 30)  # exponents of the tilts that are tried, 0 for none
-_LEAST_BITS = 20  # of a normal along lines; below, the lines are missed by rounding instead
+_LEAST_BITS = 20  # of a normal across lines; below, the lines are missed by rounding instead
+_FAR = 2.0**10  # times the size of the vertices: how far along missed lines a row still holds
+_EPS = float(np.finfo(np.float64).eps)
 
 
 def support_of(generators: ExactGenerators, normal: Floats) -> Fraction | float:
@@ -42,35 +45,39 @@ class OutwardNormals:
     ----------
     generators : ExactGenerators
         Of the nonempty set.
-    inner : integers (m, n)
+    inner : list of m lists of n integers
         Normals of rows of the set, whose sum falls along every ray.
     """
 
-    def __init__(self, generators: ExactGenerators, inner: Integers) -> None:
+    def __init__(self, generators: ExactGenerators, inner: list[list[int]]) -> None:
         self._corners = ExactGenerators(generators.vertices, generators.rays[:0], generators.lines[:0])
         self._rays = generators.rays
-        self._inner = inner.tolist()
-        self._across = null_space(generators.lines)[0].astype(object) if len(generators.lines) else None
+        self._inner = inner
+        self._lines = generators.lines
+        self._across = _short_normals(generators.lines) if len(generators.lines) else None
 
     def row(self, normal: list[int]) -> Floats:
         """A row ``[a, b]`` of floats that holds all over the set, its normal near an exact one."""
         divisor = gcd(*normal)
         exact = [v // divisor for v in normal]
-        if are_floats(exact) and not self._rises(as_floats(exact, exact)):
-            rounded = as_floats(exact, exact)
-        else:
-            rounded = self._rounded(exact)
-        return np.append(rounded, up(support_of(self._corners, rounded)))
+        near = as_floats(exact, exact)
+        rounded = near if are_floats(exact) and self._holds(near) else self._rounded(exact)
+        bound = up(support_of(self._corners, rounded))
+        if not self._holds(rounded):
+            points = floats_of_points(self._corners.vertices)
+            bound += 2.0 * _EPS * _FAR * float(np.abs(rounded) @ np.abs(points).max(axis=0))
+        return np.append(rounded, bound)
 
-    def _rises(self, normal: Floats) -> bool:
-        """Whether the normal rises along a ray."""
-        return bool((products(self._rays, whole_numbers(normal)[0]) > 0).any())
+    def _holds(self, normal: Floats) -> bool:
+        """Whether the normal rises along no ray and is constant along the lines."""
+        whole = whole_numbers(normal)[0]
+        return not ((products(self._rays, whole) > 0).any() or products(self._lines, whole).any())
 
     def _rounded(self, exact: list[int]) -> Floats:
         """The nearest normal that rises along no ray; the nearest one, if only a large tilt would do."""
         for tilt in _TILTS if len(self._rays) and self._inner else _TILTS[:1]:
             normal = self._nearest(self._tilted(exact, tilt) if tilt else exact)
-            if not self._rises(normal):
+            if self._holds(normal):
                 return normal
         return self._nearest(exact)
 
@@ -90,10 +97,16 @@ class OutwardNormals:
         room = _BITS - max(map(abs, self._across.ravel().tolist())).bit_length() - len(weights).bit_length()
         if room < _LEAST_BITS:
             return as_floats(exact, exact)
-        largest = max(abs(w) for w in weights)
-        factor = Fraction(1 << room) / largest
+        factor = Fraction(1 << room) / max(map(abs, weights))
         whole = np.array([round(w * factor) for w in weights], dtype=object) @ self._across
         return as_floats(whole.tolist(), whole.tolist())
+
+
+def _short_normals(lines: Integers) -> Integers:
+    """A basis of the normals that vanish on lines, reduced so that its integers are short."""
+    basis = null_space(lines)[0]
+    reduced = fmpz_mat(len(basis), basis.shape[1], basis.ravel().tolist()).lll()
+    return np.array([[int(v) for v in row] for row in reduced.tolist()], dtype=object).reshape(basis.shape)
 
 
 def _solved(basis: Integers, vector: list[int]) -> list[Fraction]:

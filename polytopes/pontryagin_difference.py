@@ -6,14 +6,15 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.errors import UndecidedError
 from polytopes.integers import is_short, up
 from polytopes.linear_program import Program
-from polytopes.outer_supports import exact_supports
+from polytopes.outer_supports import exact_supports, lower_supports
 from polytopes.rows import Rows, Table, everything, nothing
 from polytopes.support import maxima
 
 Floats = NDArray[np.float64]
-_CONSTANT = 1e-12  # relative variation of a linear form over a set that counts as none, unless all numbers are short
+_CONSTANT = 1e-12  # of the terms of a linear form: variation that counts as none, unless all numbers are short
 _ROUNDED = 1e-9  # radius of a largest ball, relative to the size of b, from which rounding makes no difference
 
 
@@ -21,24 +22,31 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     """Rows A, b, C, d of the difference: ``b - h_Q(a)`` for each row, the whole space if Q is empty.
 
     An equality ``c'x = d`` of P survives only if ``c'y`` is constant over Q; else nothing is left.  The supports are
-    exact, and what remains is rounded up, where the numbers are short and where rounding could empty what is flat.
+    exact, where the numbers are short and where rounding could empty what is flat; what remains is rounded up.
+
+    Raises
+    ------
+    UndecidedError
+        If Q is flat or thin, or the result nearly flat, and Q too large for rational arithmetic.
     """
-    rows = np.vstack([P.A, P.C, -P.C])
-    result = maxima(Q, rows)
+    result = maxima(Q, np.vstack([P.A, P.C, -P.C]))
     if result is None:
         return everything(P.dim)
-    if not np.isfinite(result.values).all():
+    if not np.isfinite(result.values).all() or (P.C.any() and Q.wide):
         return nothing(P.dim)
-    k, q = P.b.size, P.d.size
-    upper, lower = result.values[k : k + q], -result.values[k + q :]
-    if (upper - lower > _CONSTANT * np.maximum(1.0, np.abs(upper))).any():
-        return nothing(P.dim)
-    moved = P.A, P.b - result.values[:k], P.C, P.d - (upper + lower) / 2.0
     short = is_short(P.A, P.b, P.C, P.d) and is_short(Q.A, Q.b, Q.C, Q.d)
-    if not short and _clear(Rows(*moved).program, P.program.size):
-        return moved
-    exact = exact_supports(Q, rows)
-    return moved if exact is None else _moved(P, exact, short)
+    near = None
+    if not short and Q.wide:
+        near = P.A, np.nextafter(P.b - lower_supports(Q, P.A), np.inf), P.C, P.d
+        if _clear(Rows(*near).program, P.program.size):
+            return near
+    exact = exact_supports(Q, np.vstack([P.A, P.C, -P.C]))
+    if exact is not None:
+        size = np.abs(P.C) @ np.abs(result.points).max(axis=0, initial=0.0)
+        return _moved_exactly(P, exact, 0.0 * size if short else _CONSTANT * size)
+    if near is None:
+        raise UndecidedError("Q is flat or thin, and too large for its supports along the rows of P in rationals.")
+    return near
 
 
 def _clear(program: Program, size: float) -> bool:
@@ -47,10 +55,13 @@ def _clear(program: Program, size: float) -> bool:
     return nearest > _ROUNDED * max(program.size, size)
 
 
-def _moved(P: Rows, supports: Sequence[Fraction], short: bool) -> Table:
-    """The rows of P moved inward by supports along ``[A, C, -C]``, rounded up; an equality so becomes two rows."""
+def _moved_exactly(P: Rows, supports: Sequence[Fraction], constant: Floats) -> Table:
+    """The rows of P moved inward by supports along ``[A, C, -C]``, rounded up; an equality so becomes two rows.
+
+    A linear form of an equality may vary over Q by `constant`.
+    """
     k, q = P.b.size, P.d.size
-    if short and any(supports[k + i] != -supports[k + q + i] for i in range(q)):
+    if any(supports[k + i] + supports[k + q + i] > constant[i] for i in range(q)):
         return nothing(P.dim)
     middles = [(supports[k + i] - supports[k + q + i]) / 2 for i in range(q)]
     inner = [_row(row, Fraction(b) - h) for row, b, h in zip(P.A, P.b.tolist(), supports[:k], strict=False)]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes.checks import real_array
 from polytopes.emptiness import Emptiness, decide_emptiness
-from polytopes.exact_generators import exact_generators
+from polytopes.exact_generators import exact_generators, wide
 from polytopes.linear_program import Program, prepare
 from polytopes.minkowski_weyl import ExactGenerators
 
@@ -67,6 +67,11 @@ class Rows:
     def decided(self) -> Emptiness:
         """Emptiness of the rows, decided once."""
         return decide_emptiness(self, self.program)
+
+    @cached_property
+    def wide(self) -> bool:
+        """Whether floats know the nonempty set well: full-dimensional, wide against their rounding, bounded."""
+        return wide(self.program)
 
     @cached_property
     def exact(self) -> ExactGenerators | None:

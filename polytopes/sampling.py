@@ -1,37 +1,16 @@
-"""Volume and random points of bounded sets."""
+"""Random points of bounded sets."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes.affine_hull import affine_dim, explicit
-from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
-from polytopes.frame import unit_body, unit_frame
-from polytopes.qhull import points_volume
+from polytopes.affine_hull import explicit
+from polytopes.errors import EmptySetError, UnboundedError
+from polytopes.frame import unit_frame
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
-from polytopes.vertices import listed, vertices
 
 Floats = NDArray[np.float64]
 _STEPS = 20  # steps per coordinate between two points that are kept
-
-
-def volume(P: Rows) -> float:
-    """n-dimensional volume: 0 for flat and empty sets, inf for unbounded full-dimensional ones.
-
-    Qhull's volume of the vertices, in coordinates where the set is about as wide in every direction.
-    """
-    if affine_dim(P) < P.dim:
-        return 0.0
-    if not is_bounded(P):
-        return np.inf
-    if P.dim == 1:
-        return float(np.ptp(vertices(P)))
-    program = P.program.balanced
-    body = unit_body(program.AT.T, program.rhs, program.centre)
-    if body is None:
-        raise UndecidedError("cannot measure the volume: the set is too thin for coordinates in which it is round.")
-    size = np.prod(program.columns) * abs(np.linalg.det(body.axes))
-    return float(points_volume(listed(body)) * size)
 
 
 def random_points(P: Rows, count: int, rng: np.random.Generator) -> Floats:

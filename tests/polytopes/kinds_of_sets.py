@@ -81,9 +81,10 @@ def maximum(exact: ppl.C_Polyhedron, direction: np.ndarray) -> tuple[int, int] |
     return (int(answer["sup_n"]), int(answer["sup_d"])) if answer["bounded"] else None
 
 
-def mapped(exact: ppl.C_Polyhedron, M: np.ndarray, t: np.ndarray) -> ppl.C_Polyhedron:
-    """Image under integers, by generators."""
+def mapped(exact: ppl.C_Polyhedron, M: np.ndarray, t: np.ndarray, scale: int = 1) -> ppl.C_Polyhedron:
+    """Image under ``(M x + t) / scale`` for integers, by generators."""
     p, n = M.shape
+    M, t = M.astype(object), t.astype(object)
     x = [ppl.Variable(j) for j in range(p)]
     if exact.is_empty():
         return ppl.C_Polyhedron(p, "empty")
@@ -93,7 +94,7 @@ def mapped(exact: ppl.C_Polyhedron, M: np.ndarray, t: np.ndarray) -> ppl.C_Polyh
         divisor = int(g.divisor()) if g.is_point() else 0
         moved = sum((int(c) * v for c, v in zip(M @ entries + t * divisor, x, strict=True)), 0 * x[-1])
         if g.is_point():
-            system.insert(ppl.point(moved, divisor))
+            system.insert(ppl.point(moved, divisor * scale))
         elif (M @ entries).any():
             system.insert(ppl.ray(moved) if g.is_ray() else ppl.line(moved))
     return ppl.C_Polyhedron(system)
