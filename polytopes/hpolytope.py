@@ -82,7 +82,7 @@ class HPolytope(Rows):
         Raises
         ------
         UndecidedError
-            If there are rays, and the double description passes 20 000 rows.
+            If there are rays, and the double description passes 10 000 rows.
         """
         points = real_array("V", V, ("k", "n"))
         if 0 in points.shape:
@@ -242,7 +242,7 @@ class HPolytope(Rows):
         EmptySetError
             If the set is empty.
         UndecidedError
-            If it is unbounded and the double description passes 20 000 rays.
+            If it is unbounded and the double description passes 10 000 rays.
         """
         return generators(self)
 

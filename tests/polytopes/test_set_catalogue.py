@@ -107,6 +107,20 @@ def test_intersection_product_preimage(name: str) -> None:
 
 
 @EVERY
+def test_a_cone_keeps_its_apex_and_a_flat_set_its_points_in_any_template(name: str) -> None:
+    P = CATALOGUE[name]
+    if name in EMPTY:
+        return
+    best = P.support_points(directions(P)).points
+    for corner in np.vstack([P.generators().vertices, best[np.isfinite(best).all(axis=1)][:1]]):
+        point = HPolytope(np.empty((0, P.dim)), [], np.eye(P.dim), corner)
+        if P.intersection(point).emptiness().status == "nonempty":  # else it was rounded
+            T = directions(P)
+            for Q in (P.outer_template(T), union_bounds([P, P], T), P.affine_map(np.eye(P.dim))):
+                assert Q.intersection(point).emptiness().status == "nonempty"
+
+
+@EVERY
 def test_outer_template(name: str) -> None:
     P = CATALOGUE[name]
     normals = np.vstack([np.eye(P.dim), -np.eye(P.dim), directions(P)[:5]])
