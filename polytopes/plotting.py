@@ -12,6 +12,7 @@ from polytopes.vertices import vertices
 
 Floats = NDArray[np.float64]
 _MAX_ROWS = 20_000
+_REACH = 1e-9  # of a set's extent, within which points are one in a picture
 
 
 def shadow(P: Rows, dims: tuple[int, int]) -> Floats:
@@ -23,34 +24,43 @@ def shadow(P: Rows, dims: tuple[int, int]) -> Floats:
     frame[[0, 1], dims] = 1.0
     start = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
     corners = support_points(P, start @ frame).points[:, dims]
-    size = max(1e-300, float(np.ptp(corners, axis=0).max()))
+    units = _units(corners)
+    frame /= units[:, None]
+    corners = corners / units
     outline: list[Floats] = []
     for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        outline += _between(P, frame, dims, p, q, 1e-9 * size)
-    return _without_repeats(np.array(outline or corners[:1]), 1e-9 * size)
+        outline += _between(P, frame, dims, p, q, units)
+    return _without_repeats(np.array(outline or corners[:1])) * units
 
 
-def _between(P: Rows, frame: Floats, dims: tuple[int, int], p: Floats, q: Floats, reach: float) -> list[Floats]:
-    """Vertices from p (included) to q (excluded)."""
+def _units(corners: Floats) -> Floats:
+    """Powers of two (d,) near the extents of a set, in which it is about as wide as high; flat is flat in them too."""
+    spans = np.ptp(corners, axis=0)
+    known = np.maximum(_REACH * np.abs(corners).max(axis=0), 1e-14 * spans.max())  # what a solver may leave of nothing
+    return np.asarray(2.0 ** np.ceil(np.log2(np.maximum(np.maximum(spans, known), 1e-300))))
+
+
+def _between(P: Rows, frame: Floats, dims: tuple[int, int], p: Floats, q: Floats, units: Floats) -> list[Floats]:
+    """Vertices from p (included) to q (excluded), in units of the coordinates."""
     pending, found = [(p, q)], []
     while pending:
         p, q = pending.pop()
         chord = q - p
         length = float(np.hypot(*chord))
-        if length <= reach:
+        if length <= _REACH:
             continue
         normal = np.array([chord[1], -chord[0]]) / length
         best = support_points(P, normal @ frame)
-        corner = best.points[0, list(dims)]
-        if best.values[0] <= normal @ p + reach or min(np.hypot(*(corner - p)), np.hypot(*(corner - q))) <= reach:
+        corner = best.points[0, list(dims)] / units
+        if best.values[0] <= normal @ p + _REACH or min(np.hypot(*(corner - p)), np.hypot(*(corner - q))) <= _REACH:
             found.append(p)
         else:
             pending += [(corner, q), (p, corner)]
     return found
 
 
-def _without_repeats(points: Floats, reach: float) -> Floats:
-    keep = [k for k in range(len(points)) if np.abs(points[k] - points[k - 1]).max() > reach]
+def _without_repeats(points: Floats) -> Floats:
+    keep = [k for k in range(len(points)) if np.abs(points[k] - points[k - 1]).max() > _REACH]
     return points[keep] if keep else points[:1]
 
 
@@ -91,11 +101,12 @@ def _draw_faces(ax: Any, P: Rows, style: dict[str, Any]) -> list[Any]:
     corners = vertices(P)
     if len(corners) < 3:
         return _draw_stick(ax, corners, style)
-    reach = 1e-9 * max(1e-300, float(np.ptp(corners, axis=0).max()))
-    lengths = np.linalg.norm(P.A, axis=1)
-    faces = [corners[np.abs(corners @ a - b) <= reach * size] for a, b, size in zip(P.A, P.b, lengths, strict=True)]
-    faces = [corners] if P.d.size else [face for face in faces if len(face) >= 3]
-    solid = Poly3DCollection([_around(face) for face in faces], **style)
+    units = _units(corners)
+    scaled, normals = corners / units, P.A * units
+    lengths = np.linalg.norm(normals, axis=1)
+    faces = [scaled[np.abs(scaled @ a - b) <= _REACH * size] for a, b, size in zip(normals, P.b, lengths, strict=True)]
+    faces = [scaled] if P.d.size else [face for face in faces if len(face) >= 3]
+    solid = Poly3DCollection([_around(face) * units for face in faces], **style)
     ax.add_collection(solid, autolim=False)  # its own limits would count the padding of faces with few corners
     ax.auto_scale_xyz(*corners.T)
     return [solid]

@@ -11,6 +11,7 @@ falls from step to step towards a local optimum.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -28,6 +29,9 @@ Array = NDArray[np.float64]
 _ROUNDS = 60
 _DECREASE = 1e-4  # of the energy, relative, below which the iteration stops
 _TURNS = (0, 1, 2, 3)  # changes of sign of the inputs that the search starts from: constants, doublets, ...
+_RANDOM = 40  # starts an input, besides
+_CLIMBS = 8  # starts that are followed: of those that separate the cheapest, of the others the nearest to it
+_PATIENCE = 3  # descents to nothing cheaper after which no more are made
 _BACKTRACKS = 6
 
 
@@ -109,7 +113,8 @@ def design_input(
     Returns
     -------
     InputDesign
-        With ``u`` None if none of the starts (the limits with up to three changes of sign) leads to separation.
+        With ``u`` None if none of the starts leads to separation: inputs at their limits, alone and in pairs, with up
+        to three changes of sign, and random ones within the limits (always the same).
 
     Raises
     ------
@@ -142,6 +147,12 @@ def design_input(
     return InputDesign(u, given, search.energy(u), separation, checks)
 
 
+def _waves(samples: int) -> list[NDArray[np.bool_]]:
+    """Where an input is up (N,), with few changes of sign, of either sign first."""
+    up = [np.arange(samples) * (turns + 1) // samples % 2 == 0 for turns in _TURNS]
+    return [side for wave in up for side in (wave, ~wave)]
+
+
 @dataclass(frozen=True)
 class _Support:
     """Affine lower bounds of the separations: value (pairs,) at u, and slopes (pairs, N, nu)."""
@@ -156,7 +167,7 @@ class _Support:
 
 
 class _Search:
-    """Starts, ascent to separation, then descent in energy; every accepted step is solved anew."""
+    """Many starts, ascent to separation from the best, then descent in energy; each accepted step is solved anew."""
 
     def __init__(
         self, pairs: list[ModelPair], reference: Array, limits: tuple[Array, Array], weight: Array, hold: int,
@@ -177,30 +188,52 @@ class _Search:
 
     def run(self) -> tuple[Array | None, float]:
         """The cheapest inputs found and their separation; without any, the largest separation."""
-        best: _Support | None = None
-        largest = -np.inf
-        for start in self._starts():
-            reached = self._ascend(self._support(start))
-            largest = max(largest, reached.separation)
-            if reached.separation >= self._margin:
-                found = self._descend(reached)
-                if best is None or self.energy(found.u) < self.energy(best.u):
-                    best = found
-        return (None, largest) if best is None else (best.u, best.separation)
+        tried = [self._support(start) for start in self._starts()]
+        tried.sort(key=lambda at: -at.separation)
+        reached = [at for at in tried if at.separation >= self._margin]
+        reached.sort(key=lambda at: self.energy(at.u))
+        if not reached or self.energy(reached[0].u) > 0.0:
+            reached = reached[:_CLIMBS] + [self._ascend(at) for at in tried[:_CLIMBS] if at.separation < self._margin]
+        best = self._cheapest_of([at for at in reached if at.separation >= self._margin])
+        if best is None:
+            return None, max(at.separation for at in [*tried, *reached])
+        return best.u, best.separation
+
+    def _cheapest_of(self, starts: Sequence[_Support]) -> _Support | None:
+        """The cheapest end of descents, which stop when some in a row have led to nothing cheaper."""
+        best, idle = None, 0
+        for start in starts:
+            found = self._descend(start)
+            if best is None or self.energy(found.u) < (1.0 - _DECREASE) * self.energy(best.u):
+                best, idle = found, 0
+            else:
+                idle += 1
+            if idle == _PATIENCE:
+                break
+        return best
 
     def _starts(self) -> Iterator[Array]:
-        """The reference, then one input after the other at its limits, with a few changes of sign."""
+        """The reference; inputs at their limits, alone and in pairs, with a few changes of sign; then random ones."""
         yield self._held(self._reference)
-        samples = len(self._reference)
-        for i in range(self._reference.shape[1]):
-            if np.all(self._lower[:, i] == self._upper[:, i]):
-                continue
-            for turns in _TURNS:
-                up = np.arange(samples) * (turns + 1) // samples % 2 == 0
-                for side in (up, ~up):
-                    u = self._reference.copy()
-                    u[:, i] = np.where(side, self._upper[:, i], self._lower[:, i])
-                    yield self._held(u)
+        free = np.flatnonzero((self._lower_piece < self._upper_piece).any(axis=0)).tolist()
+        for i in free:
+            for wave in _waves(len(self._reference)):
+                yield self._at_limits({i: wave})
+        for i, j in itertools.combinations(free, 2):
+            for one, other in itertools.product(_waves(len(self._reference)), repeat=2):
+                yield self._at_limits({i: one, j: other})
+        rng = np.random.default_rng(0)
+        for _ in range(_RANDOM * len(free)):
+            inside = rng.uniform(size=self._lower_piece.shape)
+            deviation = self._lower_piece + (self._upper_piece - self._lower_piece) * inside
+            yield self._reference + self._pieces @ deviation
+
+    def _at_limits(self, up: dict[int, NDArray[np.bool_]]) -> Array:
+        """Some inputs at their upper limits where their wave (N,) is up, else at the lower ones; the others left."""
+        u = self._reference.copy()
+        for i, wave in up.items():
+            u[:, i] = np.where(wave, self._upper[:, i], self._lower[:, i])
+        return self._held(u)
 
     def _held(self, u: Array) -> Array:
         """Inputs near the given ones whose deviation is constant over each piece, within the limits."""

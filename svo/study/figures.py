@@ -156,7 +156,8 @@ def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
         for ax, snapshot in zip(row, snapshots, strict=False):
             plots.plot_sets(exemplar, snapshot, dims, plant.columns.states, ax)
             after = exemplar.time[snapshot.sample] - _start(plant, exemplar)
-            ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {after:+.2f} s\n{snapshot.event}", fontsize=9.5)
+            when = plots.in_seconds(after, plant.Ts, "+")
+            ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {when}\n{snapshot.event}", fontsize=9.5)
             ax.xaxis.set_major_locator(MaxNLocator(4))
             ax.yaxis.set_major_locator(MaxNLocator(5))
         for ax in row[len(snapshots) :]:

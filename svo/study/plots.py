@@ -118,7 +118,8 @@ def plot_alive(exemplar: Exemplar, fault_time: float, Ts: float, ax: Axes | None
         until = end if died is None else float(exemplar.time[died]) - fault_time + Ts
         artists += ax.barh(i, until - start, 0.62, left=start, color=tone[name], zorder=2)
         if died is not None:
-            artists.append(ax.text(until, i, f"  {until:.2f} s", va="center", fontsize="small", color="#30363D"))
+            when = f"  {in_seconds(until, Ts)}"
+            artists.append(ax.text(until, i, when, va="center", fontsize="small", color="#30363D"))
     artists.append(_fault_line(ax))
     ax.set_yticks(range(len(exemplar.names)), list(exemplar.names))
     ax.tick_params(axis="y", length=0)
@@ -202,6 +203,12 @@ def time_window(exemplar: Exemplar, fault_time: float, Ts: float) -> tuple[float
     if last > 0:
         end = min(end, max(1.5 * last, 10 * Ts))
     return max(float(exemplar.time[0]) - fault_time, -0.25 * end), end
+
+
+def in_seconds(time: float, Ts: float, sign: str = "-") -> str:
+    """A multiple of the sampling time Ts [s] in the digits that it needs; ``sign`` as in a format."""
+    digits = next((d for d in range(9) if abs(round(Ts, d) - Ts) <= 1e-6 * Ts), 9)
+    return f"{time:{sign}.{digits}f} s"
 
 
 def _axes(ax: Axes | None) -> Axes:

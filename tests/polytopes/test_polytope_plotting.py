@@ -80,3 +80,33 @@ def test_dims_are_checked() -> None:
         CATALOGUE["cube"].plot(dims=(0, 3))
     with pytest.raises(ValueError, match="dims is"):
         CATALOGUE["cube"].plot(dims=(1, 1))
+
+
+@pytest.mark.parametrize("scale", [[1e9, 1.0], [1.0, 1e9], [1e-6, 1e6], [1.0, 1.0]])
+def test_axes_of_very_different_extent_show_every_vertex(scale):
+    """A box of 1e9 by 1 was drawn as a line: points within 1e-9 of the larger extent were one."""
+    turn = 2 * np.pi * np.arange(11) / 11
+    points = np.column_stack([np.cos(turn), np.sin(turn)]) * scale
+    figure, axes = plt.subplots(1, 2)
+    (polygon,) = HPolytope.from_vertices(points).plot(ax=axes[0])
+    assert 11 + 1 <= len(polygon.get_xy()) <= 11 + 5  # closed
+    (box,) = HPolytope.box([0.0, 0.0], scale).plot(ax=axes[1])
+    corners = {tuple(corner) for corner in (box.get_xy() / scale).round(6)}
+    assert corners >= {(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)}  # a point along an edge does no harm
+    plt.close(figure)
+
+
+def test_flat_sets_stay_flat_beside_a_large_extent():
+    figure, ax = plt.subplots()
+    for P in (HPolytope.box([0.0, 2.0], [1e9, 2.0]), HPolytope.from_vertices([[0.0, 0.0], [1e9, 1.0]])):
+        (patch,) = P.plot(ax=ax)
+        assert len(patch.get_xy()) == 2 + 1
+    plt.close(figure)
+
+
+def test_a_solid_of_very_different_extents_has_its_faces():
+    figure = plt.figure()
+    (solid,) = HPolytope.box([0.0] * 3, [1e9, 1.0, 1e-3]).plot(ax=figure.add_subplot(projection="3d"), dims=(0, 1, 2))
+    assert len(solid._faces) == 6
+    assert solid._faces.shape[1] == 4
+    plt.close(figure)

@@ -86,6 +86,50 @@ def test_no_input_of_a_grid_is_much_cheaper() -> None:
     assert design.energy >= 0.5 * cheapest  # one step of the grid
 
 
+def two_inputs(gains: list[float]) -> UncertainModel:
+    return UncertainModel([[0.5]], [gains], [[1.0]], n=[0.1])
+
+
+CROSS = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]]  # no input alone tells all of these from no effect
+
+
+@pytest.mark.parametrize(("limit", "found"), [(0.33, False), (0.42, True), (2.0, True)])
+def test_inputs_that_separate_only_together_are_found_at_least_energy(limit: float, found: bool) -> None:
+    """Five models, two inputs: one input at a time has no slope for some pair. Each |gain' u| must reach 0.2."""
+    observers = [two_inputs(gains) for gains in CROSS]
+    limits = ([-limit] * 2, [limit] * 2)
+    design = design_input(two_inputs([0.0, 0.0]), observers, 2, initial=POINT, limits=limits, margin=1e-2)
+    assert (design.u is not None) == found
+    if found:
+        assert design.energy == pytest.approx(0.202**2 + 0.404**2, rel=1e-3)
+        assert design.horizon == 2
+    else:
+        assert design.separation == pytest.approx(-0.175, abs=0.03)  # (0.33 - 0.165) / 0.2 - 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_five_random_models_of_two_inputs_are_separated_near_the_least_energy(seed: int) -> None:
+    """Wherever one of 2000 random inputs separates them; the cheapest of a fine random search is no cheaper."""
+    rng = np.random.default_rng(seed)
+    models = [
+        UncertainModel([[0.8, 0.2], [-0.1, 0.7]], rng.normal(size=(2, 2)), np.eye(2), n=[0.15, 0.15]) for _ in range(5)
+    ]
+    X, limits, samples = HPolytope.box([0.0] * 2, [0.0] * 2), ([-1.0] * 2, [1.0] * 2), 3
+    pairs = [ModelPair(models[0], model, samples, X, X, np.zeros((samples, 2)), None) for model in models[1:]]
+    cheapest = np.inf
+    for _ in range(2000):
+        u = rng.uniform(-1, 1, (samples, 2)) * rng.uniform(0.2, 1)
+        u[-1] = 0.0  # of no effect within the horizon
+        if np.sum(u**2) < cheapest:
+            separation = min(pair.with_inputs(u).solve(samples, least=-1.0).separation for pair in pairs)
+            cheapest = float(np.sum(u**2)) if separation >= 1e-2 else cheapest
+    design = design_input(models[0], models[1:], samples, initial=X, limits=limits, margin=1e-2)
+    assert (design.u is not None) or not np.isfinite(cheapest)
+    if design.energy is not None:
+        assert design.energy <= 1.001 * cheapest
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_the_observer_is_falsified_within_the_horizon_whatever_happens(seed: int) -> None:
     # The observer's Delta multiplies input and state, and the factor of the input changes sign with it.

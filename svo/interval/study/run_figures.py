@@ -11,6 +11,7 @@ from svo.interval.detector import IntervalRecord
 from svo.interval.study.run import LearnsDetectors
 from svo.plant import HEALTHY, fault_start
 from svo.study.figures import STYLE, Picture, save_picture
+from svo.study.plots import in_seconds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,7 +114,7 @@ def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Pi
             ax.axvline(start, color="0.4", lw=0.9, ls=":", label="fault")
             if alarm is not None:
                 ax.axvline(alarm, color="black", lw=0.9, label="alarm")
-        near.set_title("" if alarm is None else f"alarm {alarm - start:.2f} s after the fault")
+        near.set_title("" if alarm is None else f"alarm {in_seconds(alarm - start, plant.Ts)} after the fault")
     handles, labels = figure.axes[1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     text = "As Figure 5: the whole run, and the time from fault to alarm (pole of the last filter but one)."

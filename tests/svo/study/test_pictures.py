@@ -173,3 +173,31 @@ def test_sets_are_pictured_where_there_are_two_states(
 
 def test_fault_free_studies_have_no_pictures(tank: Plant, summaries: list[ConditionSummary], tmp_path: Path) -> None:
     assert write_pictures(tmp_path, tank, summaries[:1], [exemplar("none", "none")]) == []
+
+
+@pytest.mark.parametrize(
+    ("time", "Ts", "text"),
+    [
+        (21.0, 1.0, "21 s"),
+        (0.0042, 0.0002, "0.0042 s"),
+        (0.003, 0.001, "0.003 s"),
+        (0.5, 0.01, "0.50 s"),
+        (0.075, 0.025, "0.075 s"),
+        (3e-6, 1e-6, "0.000003 s"),
+        (2.0, 1 / 3, "2.000000 s"),
+        (600.0, 60.0, "600 s"),
+    ],
+)
+def test_times_have_the_digits_of_the_sampling_time(time: float, Ts: float, text: str) -> None:
+    """0.00 s for a plant with 0.2 ms, 21.00 s with 1 s."""
+    assert plots.in_seconds(time, Ts) == text
+    assert plots.in_seconds(time, Ts, "+") == f"+{text}"
+
+
+def test_pictures_write_times_in_the_digits_of_the_sampling_time() -> None:
+    for Ts, text in ((0.0002, "  0.0020 s"), (1.0, "  10 s")):
+        run = exemplar()
+        run = Exemplar(**{**vars(run), "time": run.time * Ts / 0.1}) if hasattr(run, "__dict__") else run
+        ax = Figure().subplots()
+        plots.plot_alive(run, 11 * Ts, Ts, ax)
+        assert ax.texts[0].get_text() == text
