@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
 
 from svo.checks import finite_array
 from svo.held import Varying, which_vary
-from svo.inside_sample import departure, growth, kept
+from svo.inside_sample import departure, exponential, growth, kept
 from svo.model import UncertainModel
 from svo.stack import STATE_BLOCKS
 from svo.uncertainty import Uncertainty
@@ -21,10 +20,10 @@ _ROUNDED_UP = 1e-9  # relative: more than what sums of numbers >= 0, fewer than 
 
 
 def zero_order_hold(A: ArrayLike, B: ArrayLike, Ts: float) -> tuple[Array, Array]:
-    """exp(A Ts) and int_0^Ts exp(A t) dt B, from one exponential of [[A B], [0 0]]."""
+    """exp(A Ts) and int_0^Ts exp(A t) dt B, from one exponential of [[A B], [0 0]]; the nearest floats."""
     A, B = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
     n, m = B.shape
-    joint = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * Ts)
+    joint = exponential(np.block([[A, B], [np.zeros((m, n + m))]]), Ts)
     return joint[:n, :n], joint[:n, n:]
 
 

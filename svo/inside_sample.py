@@ -12,12 +12,28 @@ from contextlib import contextmanager
 import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 Array = NDArray[np.float64]
 _BITS = 512  # states in units of 2^-80 to 2^80 keep a float's digits
+_MOST_BITS = 8192
 _PARTS = 16  # of a sample, more where it is long against the dynamics
 _MOST_PARTS = 1024
+
+
+def exponential(M: Array, Ts: float) -> Array:
+    """exp(M Ts), every entry the nearest float, so that units which are powers of two scale it to the bit."""
+    bits = _BITS
+    while True:
+        with _digits(bits):
+            entries = (_exact(M) * arb(Ts)).exp().tolist()
+            if bits >= _MOST_BITS or all(_is_settled(v) for row in entries for v in row):
+                return np.array([[float(v.mid()) for v in row] for row in entries])
+        bits *= 2
+
+
+def _is_settled(value: arb) -> bool:
+    """Whether a ball is known to far more digits than a float has; zeros of the matrix' structure are exact."""
+    return bool(value.rad() == 0) or bool(value.rel_accuracy_bits() > 100)
 
 
 def growth(A: Array, Ts: float) -> Array:
@@ -62,7 +78,7 @@ def kept(A: Array, M: Array, Ts: float) -> Array:
     With this as ``held`` the set of a signal's mean and its departure is not wider, in any coordinate, than the
     signal itself makes it, and what all coordinates share is still shared. Any other value would be sound too.
     """
-    step = expm(A * (Ts / _PARTS))
+    step = exponential(A, Ts / _PARTS)
     values = [M]
     for _ in range(_PARTS):
         values.append(step @ values[-1])
@@ -81,8 +97,8 @@ def _metzler(A: Array) -> Array:
 
 
 @contextmanager
-def _digits() -> Iterator[None]:
-    before, ctx.prec = ctx.prec, _BITS
+def _digits(bits: int = _BITS) -> Iterator[None]:
+    before, ctx.prec = ctx.prec, bits
     try:
         yield
     finally:
