@@ -17,6 +17,7 @@ from svo.elastic_program import Bound, ElasticProgram, bounds_of, widened
 from svo.lifted_rows import bounding_box
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm
 
 Array = NDArray[np.float64]
 
@@ -114,13 +115,13 @@ def calibrate(
     if not isinstance(window, int | np.integer) or window < 2:
         raise ValueError(f"window is {window!r}; expected a number of samples >= 2")
     _check_log(model, log)
-    bounding_box("initial", initial, model.n_states)
+    form = NormalForm.at(model, *bounding_box("initial", initial, model.n_states))
     chosen = bounds_of(model, bounds)
     amounts, samples = np.zeros(len(chosen)), dict[int, int]()
     first, start = 0, initial
     while True:
         count = min(int(window), len(log) - first)
-        piece = ElasticProgram(model, log, chosen, first, count, start)
+        piece = ElasticProgram(form, log, chosen, first, count, start)
         found = piece.solve(amounts)
         if found is None:
             names = ", ".join(bound.name for bound in chosen) or "nothing"

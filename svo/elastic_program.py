@@ -13,6 +13,7 @@ from polytopes import HPolytope
 from svo.lifted_rows import Channel, LiftedSample, evaluate, line_rows, set_rows
 from svo.log import Log
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm, set_in
 from svo.sparse_program import Columns, SparseProgram, Terms
 
 Array = NDArray[np.float64]
@@ -45,16 +46,21 @@ class Explained:
 
 
 class ElasticProgram:
-    """The samples first, ..., first + count - 1 of a log, from a set of first states."""
+    """The samples first, ..., first + count - 1 of a log, from a set of first states.
+
+    Log, bounds and set are as they are given; the program is about the model's normal form.
+    """
 
     def __init__(
-        self, model: UncertainModel, log: Log, chosen: Sequence[Bound], first: int, count: int, start: HPolytope
+        self, form: NormalForm, log: Log, chosen: Sequence[Bound], first: int, count: int, start: HPolytope
     ) -> None:
-        self._model, self._log, self._first, self._count, self._start = model, log, first, count, start
+        self._form, self._model, self._log, self._first, self._count = form, form.model, log, first, count
+        self._start = set_in(start, form.x)
         self._chosen = {(bound.kind, bound.index): i for i, bound in enumerate(chosen)}
-        self._scales = np.array([bound.scale for bound in chosen])
-        self._evaluated = [evaluate(model, log.schedule_at(first + k)) for k in range(count)]
-        self.is_exact = all(_is_known(model, c) for _, channels in self._evaluated for c in channels)
+        units = {"noise": form.y, "disturbance": form.w}
+        self._scales = np.array([b.scale / units[b.kind][b.index] if b.kind in units else b.scale for b in chosen])
+        self._evaluated = [evaluate(self._model, log.schedule_at(first + k)) for k in range(count)]
+        self.is_exact = all(_is_known(self._model, c) for _, channels in self._evaluated for c in channels)
 
     def solve(
         self, allowed: Array, samples: int | None = None, only: int | None = None, signs: Array | None = None
@@ -96,15 +102,15 @@ class ElasticProgram:
             return None
         point = solution.point
         found = np.array([[1.0 if c.functional @ point[s.known] >= 0 else -1.0 for c in s.channels] for s in lifted])
-        return Explained(point[widening], np.array([point[s.x] for s in lifted]), found)
+        return Explained(point[widening], np.array([point[s.x] for s in lifted]) * self._form.x, found)
 
     def _states(self, program: SparseProgram) -> Columns:
         size = self._model.n_states
         return program.columns(np.full(size, -np.inf), np.full(size, np.inf))
 
     def _sample(self, elastic: _Elastic, k: int, x: Columns, one: Columns, signs: Array | None) -> LiftedSample:
-        model, program, u_now = self._model, elastic.program, self._log.u[self._first + k]
-        stack, channels = self._evaluated[k]
+        model, program, u_now = self._model, elastic.program, self._form.inputs(self._log.u[self._first + k])
+        stack, channels = self._evaluated[k]  # what they leave out is far below the solver's tolerance
         lower, upper, noise = model.bounds(self._log.schedule_at(self._first + k))
         u = program.columns(u_now, u_now)
         w = self._disturbances(elastic, lower, upper)
@@ -123,9 +129,17 @@ class ElasticProgram:
             else:
                 program.rows([(known, signs[q] * f[None, :])], 0.0, np.inf)
                 line_rows(program, channel, known, column, *((0.0, np.inf) if signs[q] > 0 else (-np.inf, 0.0)))
-        lifted = LiftedSample(x, w, known, stack, channels, p, noise)
-        y = self._log.y[self._first + k]
+        nothing = np.zeros(0, dtype=np.int64), np.zeros((len(stack), 0))
+        lifted = LiftedSample(x, w, known, stack, channels, p, noise, *nothing)
+        read = self._log.y[self._first + k]
+        y = self._form.outputs(read)
         for i in np.flatnonzero(~np.isnan(y)):
+            if abs(float(y[i])) / (float(noise[i]) or 1.0) > _LARGEST:
+                raise ValueError(
+                    f"y of the log has the value {read[i]:g} of sensor {i}, over {_LARGEST:g} times its "
+                    "noise; no program can hold that, so where it stands for a missing measurement, leave the cell "
+                    "empty (NaN)"
+                )
             elastic.measure(int(i), lifted.terms(slice(n + i, n + i + 1)), float(y[i]), float(noise[i]))
         return lifted
 
@@ -168,11 +182,6 @@ class _Elastic:
         if i is not None:
             width += self.scales[i] * self.allowed[i]
         unit = noise or 1.0  # rows of about size one, for the solver's absolute tolerance
-        if abs(float(y)) / float(unit) > _LARGEST:
-            raise ValueError(
-                f"y of the log has the value {y:g} of sensor {sensor}, over {_LARGEST:g} times its noise; "
-                "no program can hold that, so where it stands for a missing measurement, leave the cell empty (NaN)"
-            )
         row = [(columns, matrix / unit) for columns, matrix in terms]
         above, below = [*row, (self.common, np.ones((1, 1)))], [*row, (self.common, -np.ones((1, 1)))]
         if i is not None:

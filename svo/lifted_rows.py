@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.model import UncertainModel
+from svo.observers.window_kernel import channel_count, channel_factors
 from svo.sparse_program import Columns, SparseProgram, Terms
 
 Array = NDArray[np.float64]
-_LEFT_OVER = 1e-13  # of a stack, relative, that its channels may leave out
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class LiftedSample:
         [[A B a E], [C D c F]], with every Delta of a single possible value added in.
     channels, p : channels and their variables
     noise : (ny,) array
+    rest, on_rest : variables, and the rows that they enter (n + ny, k)
+        Of what the channels leave out of the uncertainties.
     """
 
     x: Columns
@@ -51,37 +53,45 @@ class LiftedSample:
     channels: tuple[Channel, ...]
     p: Columns
     noise: Array
+    rest: Columns
+    on_rest: Array
 
     def terms(self, rows: slice) -> Terms:
         """The rows of [x(k+1); y(k)] as terms of a program."""
         gains = np.array([c.gain for c in self.channels]).reshape(-1, len(self.stack)).T
-        return [(self.known, self.stack[rows]), (self.p, gains[rows])]
+        return [(self.known, self.stack[rows]), (self.p, gains[rows]), (self.rest, self.on_rest[rows])]
 
 
 def evaluate(model: UncertainModel, schedule: Any) -> tuple[Array, tuple[Channel, ...]]:
     """The stack at a sample, Deltas of a single value added in, and the channels of the others."""
+    return evaluate_with_rest(model, schedule)[:2]
+
+
+def evaluate_with_rest(model: UncertainModel, schedule: Any) -> tuple[Array, tuple[Channel, ...], Array]:
+    """`evaluate`, and what it leaves out.
+
+    Returns
+    -------
+    stack : (n + ny, n + nu + 1 + nw) array
+        With the Deltas of a single value added in.
+    channels : tuple of Channel
+        Of the others.
+    left : array like ``stack``
+        Bound of what the channels leave out of their uncertainties, times |Delta|, entry by entry.
+    """
     stacks = model.stack(schedule)
-    total, channels = stacks[0].copy(), []
+    total, left, channels = stacks[0].copy(), np.zeros_like(stacks[0]), []
     for i, (item, uncertainty) in enumerate(zip(stacks[1:], model.uncertainties, strict=True)):
         lo, hi = uncertainty.bounds
         if lo == hi:
             total += lo * item
-        else:
-            channels += [Channel(i, gain, functional, lo, hi) for gain, functional in _rank_one_terms(item)]
-    return total, tuple(channels)
-
-
-def _rank_one_terms(item: Array) -> list[tuple[Array, Array]]:
-    """A matrix as a sum of gain functional', by complete pivoting."""
-    rest, terms = item.copy(), []
-    largest = np.abs(item).max()
-    while np.abs(rest).max() > _LEFT_OVER * largest:
-        r, c = np.unravel_index(np.abs(rest).argmax(), rest.shape)
-        gain, functional = rest[:, c] / rest[r, c], rest[r].copy()
-        rest -= np.outer(gain, functional)
-        rest[r], rest[:, c] = 0.0, 0.0
-        terms.append((gain, functional))
-    return terms
+            continue
+        owner = np.ones(channel_count(item), dtype=np.int64)
+        delta = np.tile([[lo, hi]], (len(owner), 1))
+        gains, functionals, rest, _ = channel_factors(np.stack([item, item]), owner, delta)
+        channels += [Channel(i, gain, functional, lo, hi) for gain, functional in zip(gains, functionals, strict=True)]
+        left += rest
+    return total, tuple(channels), left
 
 
 def line_rows(program: SparseProgram, channel: Channel, known: Columns, p: Columns, low: float, high: float) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.lifted_rows import LiftedSample, bounding_box, evaluate, line_rows, set_rows
+from svo.lifted_rows import LiftedSample, bounding_box, evaluate_with_rest, line_rows, set_rows
 from svo.model import UncertainModel
+from svo.normal_form import NormalForm, exponents_of, set_in
 from svo.reachable_set import ReachableSet, product_bounds
 from svo.sparse_program import Columns, Solution, SparseProgram
 
@@ -74,20 +75,29 @@ class ModelPair:
             )
         if plant.Ts != observer.Ts:
             raise ValueError(f"observer_model has Ts = {observer.Ts} s; expected {plant.Ts} s, as plant_model has")
-        self._models = (plant, observer)
-        self._initial = (initial, observer_initial)
-        names = ("initial", "observer_initial")
-        self._boxes = [
-            bounding_box(name, P, m.n_states) for name, P, m in zip(names, self._initial, self._models, strict=True)
+        boxes = [
+            bounding_box(name, P, m.n_states)
+            for name, P, m in (("initial", initial, plant), ("observer_initial", observer_initial, observer))
         ]
+        shared = exponents_of(plant, *boxes[0])
+        own = replace(exponents_of(observer, *boxes[1]), inputs=shared.inputs, outputs=shared.outputs)
+        self._forms = NormalForm(plant, shared), NormalForm(observer, own)
+        self._models = tuple(form.model for form in self._forms)
+        self._initial = tuple(
+            set_in(P, form.x) for P, form in zip((initial, observer_initial), self._forms, strict=True)
+        )
+        self._boxes = [(low / form.x, high / form.x) for (low, high), form in zip(boxes, self._forms, strict=True)]
         self._schedule = _schedules(schedule, horizon, any(m.is_scheduled for m in self._models))
-        self._input_set = u if isinstance(u, HPolytope) else None
-        self._inputs = _inputs(u, horizon, plant.n_inputs)
+        unit = self._forms[0].u
+        self._input_set = set_in(u, unit) if isinstance(u, HPolytope) else None
+        low, high = _inputs(u, horizon, plant.n_inputs)
+        self._inputs = low / unit, high / unit
 
     def with_inputs(self, u: Array) -> ModelPair:
         """The same pair under other inputs (horizon, nu)."""
         other = copy(self)
-        other._input_set, other._inputs = None, (u, u)
+        normal = u / self._forms[0].u
+        other._input_set, other._inputs = None, (normal, normal)
         return other
 
     def solve(self, samples: int, least: float = 0.0) -> PairSolution:
@@ -108,7 +118,7 @@ class ModelPair:
         solution = program.minimise(cost)
         if solution is None:  # widening explains anything, so only contradictory sets get here
             raise ValueError("initial, u or w has no point; expected nonempty sets")
-        return PairSolution(program, cost, solution, np.array(u), sides[0], sides[1], least)
+        return PairSolution(program, cost, solution, np.array(u), sides[0], sides[1], least, self._forms)
 
     def _input_columns(self, program: SparseProgram, k: int) -> Columns:
         columns = program.columns(self._inputs[0][k], self._inputs[1][k])
@@ -131,7 +141,7 @@ class _Side:
     def add(self, u: Columns, u_box: tuple[Array, Array], one: Columns, schedule: Any, last: bool) -> None:
         model, program = self.model, self._program
         lower, upper, noise = model.bounds(schedule)
-        stack, channels = evaluate(model, schedule)
+        stack, channels, left = evaluate_with_rest(model, schedule)
         w = program.columns(lower, upper)
         if model.disturbance_polytope is not None:
             set_rows(program, w, model.disturbance_polytope)
@@ -144,9 +154,13 @@ class _Side:
         for c, (low, high), column in zip(channels, s, p, strict=True):
             self.exact &= line_rows(program, c, known, np.array([column]), low, high)
         self.exact &= len({c.owner for c in channels}) == len(channels)
-        self.samples.append(LiftedSample(self._x, w, known, stack, channels, p, noise))
+        boxes = zip(*(self._reachable.box(), others), strict=True)
+        reach = np.max(np.abs([np.concatenate(ends) for ends in boxes]), axis=0)
+        rest, used = left @ reach, left.any(axis=1)
+        d, on_d = program.columns(-rest[used], rest[used]), np.eye(len(rest))[:, used]
+        self.samples.append(LiftedSample(self._x, w, known, stack, channels, p, noise, d, on_d))
         if not last:
-            self._reachable.move(stack, channels, others, (p_lower, p_upper))
+            self._reachable.move(stack, channels, others, (p_lower, p_upper), rest[: model.n_states])
             self._x = program.columns(*self._reachable.box(), implied=True)
             n = model.n_states
             program.rows([*self.samples[-1].terms(slice(0, n)), (self._x, -np.eye(n))], 0.0, 0.0)
@@ -163,6 +177,7 @@ class PairSolution:
     plant: _Side
     observer: _Side
     least: float
+    forms: tuple[NormalForm, NormalForm]
 
     @property
     def _multipliers(self) -> Array:
@@ -181,7 +196,7 @@ class PairSolution:
         For inputs that leave every row as it is (no s = f'(u, 1) changes its sign) the line through this separation
         lies below that of all other inputs: by weak duality, up to the bounds that the solver does not see.
         """
-        return self.program.reduced_costs(self.cost, self._multipliers)[self.u]
+        return self.program.reduced_costs(self.cost, self._multipliers)[self.u] / self.forms[0].u
 
     @property
     def separated(self) -> bool:
@@ -207,7 +222,13 @@ class PairSolution:
         found = [_explanation(side, point, y - z) for side, z in zip(sides, outputs, strict=True)]
         if found[0] is None or found[1] is None:
             return None
-        return Witness(point[self.u], y, found[0], found[1])
+        plant, observer = (_given(e, form) for e, form in zip(found, self.forms, strict=True) if e is not None)
+        return Witness(point[self.u] * self.forms[0].u, y * self.forms[0].y, plant, observer)
+
+
+def _given(e: Explanation, form: NormalForm) -> Explanation:
+    """A trajectory in the units of the model as it is given."""
+    return Explanation(e.x * form.x, e.w * form.w, e.noise * form.y, e.delta)
 
 
 def _common_output(program: SparseProgram, a: LiftedSample, b: LiftedSample, widening: Columns) -> None:

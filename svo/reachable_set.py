@@ -32,14 +32,16 @@ class ReachableSet:
         lower, upper = _around(np.array([centre]), np.array([radius]))
         return (float(centre), float(centre)) if radius == 0.0 else (float(lower[0]), float(upper[0]))
 
-    def move(self, stack: Array, channels: tuple[Channel, ...], others: Box, p: Box) -> None:
-        """To the next sample: x+ = [A B a E](x, u, 1, w) + sum of gain p, with p anywhere in its box."""
+    def move(self, stack: Array, channels: tuple[Channel, ...], others: Box, p: Box, rest: Array | None = None) -> None:
+        """To the next sample: x+ = [A B a E](x, u, 1, w) + sum of gain p + r, p in its box and |r| <= rest (n,)."""
         n = len(self._centre)
         middle, half = _middle(others)
         p_middle, p_half = _middle(p)
         gains = np.array([c.gain[:n] for c in channels]).reshape(-1, n).T
         self._centre = stack[:n, :n] @ self._centre + stack[:n, n:] @ middle + gains @ p_middle
         parts = [stack[:n, :n] @ self._generators, stack[:n, n:] * half, gains * p_half]
+        if rest is not None:
+            parts.append(np.diag(rest))
         generators = np.hstack(parts)
         self._generators = generators[:, np.abs(generators).max(axis=0) > 0.0]
 
