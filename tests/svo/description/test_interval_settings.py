@@ -218,7 +218,7 @@ def test_another_model_beside_the_alarms_is_noticed(tmp_path: Path) -> None:
         app, ["verify", str(tmp_path / "f" / "alarms.jsonl"), "--full", str(tmp_path / "log.csv")]
     )
     assert full.exit_code == 1
-    assert "the plant's observer is falsified" in full.stderr
+    assert "differs from that of the plant's model 'nominal'" in full.stderr
 
 
 def test_calibration_takes_a_described_plant(tmp_path: Path) -> None:
