@@ -155,7 +155,7 @@ def test_workers_of_a_killed_study_end(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "svo", "study", "elevator", "--runs", "60", "--workers", "2", "--out"]
     process = subprocess.Popen([*command, str(tmp_path / "out")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     workers: list[int] = []
-    end = time.monotonic() + 120.0
+    end = time.monotonic() + 300.0
     while len(workers) < 2 and process.poll() is None and time.monotonic() < end:
         time.sleep(0.1)
         workers = _workers_of(process.pid)
