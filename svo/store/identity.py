@@ -27,11 +27,14 @@ class Identity:
         Plain data, as JSON gives them back.
     versions : mapping of str to str
         Of the software; that of "machine" is for the record only.
+    runs : int or None
+        How many there are, so that what is none of them is known; None where it is not said.
     """
 
     format: str
     configuration: Mapping[str, Any]
     versions: Mapping[str, str]
+    runs: int | None = None
 
     @property
     def digest(self) -> str:
@@ -69,7 +72,10 @@ class Identity:
         versions = stored.get("versions")
         if not (isinstance(versions, dict) and all(isinstance(value, str) for value in versions.values())):
             raise ValueError(f"{wrong}; versions is no object of texts")
-        return cls(format, stored["configuration"], versions)
+        runs = stored.get("runs")
+        if not (runs is None or (isinstance(runs, int) and runs > 0)):
+            raise ValueError(f"{wrong}; runs is {runs!r:.80}, expected how many there are")
+        return cls(format, stored["configuration"], versions, runs)
 
     def check_same(self, now: Identity, folder: Path) -> None:
         """Raise a ValueError if a folder's identity (this one) is not that of what is to go on in it."""

@@ -47,12 +47,15 @@ class Parts(Generic[Row]):
     study : str
         What the parts belong to (a digest); a part of something else is a stray.
     format : Format
+    runs : int, optional
+        How many runs there are; parts of others are strays.
     """
 
     folder: Path
     row: type[Row]
     study: str
     format: Format = field(default_factory=Parquet)
+    runs: int | None = None
 
     def make(self) -> None:
         """Make the folder, and remove what killed processes left unfinished in it.
@@ -103,6 +106,9 @@ class Parts(Generic[Row]):
                 continue
             if path != self.path(run):
                 strays[path] = "not the name of a part"
+                continue
+            if self.runs is not None and run >= self.runs:
+                strays[path] = "none of the study's runs"
                 continue
             try:
                 seal = read_seal(path.read_bytes())

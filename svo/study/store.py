@@ -70,7 +70,7 @@ class StudyStore(Generic[Row]):
         with locked(self.path):
             self._check_content(configuration, resume)
             if not self._identity.exists():
-                _identity(configuration).write(self._identity)
+                _identity(configuration, len(runs)).write(self._identity)
             self._parts().make()
             self._joined.make()
             self._exemplars.mkdir(exist_ok=True)
@@ -155,7 +155,8 @@ class StudyStore(Generic[Row]):
         return self._parts().survey()
 
     def _parts(self, identity: Identity | None = None) -> Parts[Row]:
-        return Parts(self.parts, self.row, (identity or self._stored()).digest)
+        known = identity or self._stored()
+        return Parts(self.parts, self.row, known.digest, runs=known.runs)
 
     @property
     def _joined(self) -> Joined:
@@ -217,8 +218,8 @@ class StudyFolder(StudyStore[RunRow]):
         self.store(run, [outcome.row], configuration, attached)
 
 
-def _identity(configuration: StudyConfiguration) -> Identity:
-    return Identity(FORMAT, configuration.to_dict(), versions())
+def _identity(configuration: StudyConfiguration, runs: int | None = None) -> Identity:
+    return Identity(FORMAT, configuration.to_dict(), versions(), runs)
 
 
 def _digests(seals: Mapping[int, Any], kind: str) -> dict[int, str]:

@@ -108,12 +108,13 @@ def test_copies_and_strays_neither_count_nor_break_anything(study: StudyFolder) 
     part = (study.parts / "run-000001.parquet").read_bytes()
     for name in ("run-000099.parquet", "run-000001 copy.parquet", ".DS_Store", "run-000001.parquet~"):
         (study.parts / name).write_bytes(part)
+    (study.parts / "run-000050.parquet").write_bytes(part[:-100])
     (study.path / "exemplars" / "run-000007.npz").write_bytes(b"")
     (study.path / ".DS_Store").write_bytes(b"")
     assert untimed(study) == rows
     answer = run("report", study.path)
     assert answer.exit_code == 0, answer.output
-    assert "run-000099.parquet is a copy of the part of run 1; ignored" in answer.output
+    assert "run-000099.parquet is none of the study's runs; ignored" in answer.output
     assert ".DS_Store" not in answer.output
     assert resumed(study) == [(4, 4)]
     assert (study.parts / "run-000099.parquet").exists()
@@ -220,6 +221,7 @@ def change_configuration(**changes: Any) -> Callable[[str], str]:
         (change(configuration={}), "the configuration lacks 'architectures'"),
         (change(configuration=[]), "expected an object with a configuration"),
         (change(versions=None), "versions is no object of texts"),
+        (change(runs="four"), "runs is 'four', expected how many there are"),
         (change(format=None), "has the format None, that of another version"),
         (change(format="svo-study-9"), "has the format 'svo-study-9', that of another version"),
         (change_configuration(plant=None), "the configuration lacks 'plant'"),
