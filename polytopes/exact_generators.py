@@ -7,7 +7,7 @@ the end, so they are taken only where floats cannot decide: flat, thin and unbou
 import numpy as np
 
 from polytopes.errors import UndecidedError
-from polytopes.integers import Floats, integer_rows, short
+from polytopes.integers import Floats, integer_rows, short, short_vector
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, generators_of
 
@@ -15,6 +15,7 @@ SHORT_RAYS = 2_000
 """Rays of the double description beyond which a set of short rows is left to floats, if they can decide."""
 LONG_RAYS = 500
 """The same for longer rows."""
+_FEW_RAYS = 200
 _LONG_ROWS = 100
 _COORDINATES = 16
 _WIDE = 1e-6  # radius of a largest ball, relative to the size of b, from which rounding is small beside it
@@ -30,6 +31,22 @@ def exact_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Progra
         return None
     try:
         return generators_of(rows, SHORT_RAYS if plain else LONG_RAYS)
+    except UndecidedError:
+        return None
+
+
+def few_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Program) -> ExactGenerators | None:
+    """The same, if there are at most 200; without a program for a set that is not flat or thin."""
+    if A.shape[1] > _COORDINATES or b.size + d.size > _LONG_ROWS:
+        return None
+    plain = len(A) > 0 and short_vector([*A[0].tolist(), float(b[0])])  # as a rule, all are if the first is
+    if not plain and program.fat and not program.flat.pivots:
+        return None
+    rows = integer_form(A, b, C, d)
+    if plain and not (short(rows.inequalities) and short(rows.equalities)):
+        return None
+    try:
+        return generators_of(rows, _FEW_RAYS)
     except UndecidedError:
         return None
 

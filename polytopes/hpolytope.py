@@ -346,9 +346,11 @@ class HPolytope(Rows):
             Different coordinates, at least one.
         method : {"auto", "fourier-motzkin", "convex-hull", "vertices"}
             "fourier-motzkin" works for every set and is fastest on sparse rows; "convex-hull" (a bounded shadow) costs
-            by the facets of the result; "vertices" (a bounded set) by the vertices of this one.  "auto" eliminates
-            while a step forms, and the next is foreseen to form, at most 3000 rows; then it takes the vertices (at
-            most 5 coordinates, or 6 and 4 or more kept) or the convex hull, if the set or its shadow is bounded.
+            by the facets of the result; "vertices" (a bounded set) by the vertices of this one.  "auto" takes
+            the hull of the projected generators in integers, exact or outward, where rows are short or the set flat or
+            thin, and they are at most 200; else it eliminates while a step forms, and the next is foreseen to form, at
+            most 3000 rows; then it takes the vertices (at most 5 coordinates, or 6 and 4 or more kept) or the convex
+            hull, if the set or its shadow is bounded.
         max_rows : int
             Limit on the rows that one step of Fourier-Motzkin may form.
         outer : bool

@@ -8,10 +8,11 @@ set in fewer coordinates.  Then
 - "convex-hull" refines a hull of support points; the choice for dense rows, its cost goes with the facets it finds;
 - "vertices" takes the hull of projected vertices; good only while the vertices can be listed (total dimension <= 6).
 
-"auto" eliminates as long as no step forms more than 3000 rows (some 5 ms) or lets the next one be foreseen to.  Beyond,
-a bounded set of at most 5 coordinates, or of 6 with a shadow in 4 or 5, goes by its vertices (each round of the
-refinement is a hull in so many coordinates); any other with a bounded shadow by the hull of support points.  Measured
-on sets of 4 to 8 coordinates and 30 to 80 rows, see ``docs/polytopes.md``.
+"auto" takes the hull of the projected generators, in integers, where rows are short or the set is flat or thin, and
+they are at most 200.  Else it eliminates as long as no step forms more than 3000 rows (some 5 ms) or lets the next one
+be foreseen to.  Beyond, a bounded set of at most 5 coordinates, or of 6 with a shadow in 4 or 5, goes by its vertices
+(each round of the refinement is a hull in so many coordinates); any other with a bounded shadow by the hull of support
+points.  Measured on sets of 4 to 8 coordinates and 30 to 80 rows, see ``docs/polytopes.md``.
 """
 
 from collections.abc import Sequence
@@ -24,10 +25,13 @@ from polytopes.affine import AffineSet, affine_set
 from polytopes.affine_hull import explicit
 from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
+from polytopes.exact_generators import few_generators
 from polytopes.fourier_motzkin import eliminate
 from polytopes.hull import normals_by_supports, outer_rows
+from polytopes.minkowski_weyl import shadow
 from polytopes.outer_supports import upper_supports
 from polytopes.outer_template import outer_template
+from polytopes.outward import float_rows
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty, maxima
 from polytopes.vertices import vertices
@@ -68,6 +72,9 @@ def project(
     n, k = P.dim, len(keep)
     if not known_nonempty(P):
         return np.zeros((1, k)), np.array([-1.0]), np.empty((0, k)), np.empty(0)
+    few = few_generators(P.A, P.b, P.C, P.d, P.program) if method == "auto" else None
+    if few is not None:
+        return float_rows(shadow(few, list(keep)))
     P = explicit(P)
     if not P.d.size and P.program.kept.size == P.b.size:
         order = [*keep, *(j for j in range(n) if j not in keep)]

@@ -97,6 +97,15 @@ def test_image_and_preimage(count: int) -> None:
 
 
 @AMOUNT
+def test_projection(count: int) -> None:
+    for case, rng, P, _ in pairs(count):
+        n = P.space_dimension()
+        keep = rng.permutation(n)[: int(rng.integers(1, n + 1))].tolist()
+        exact = mapped(P, np.eye(n, dtype=int)[keep], np.zeros(len(keep), dtype=int))
+        assert polyhedron(rows_of(P).project(keep)) == exact, case
+
+
+@AMOUNT
 def test_templates_are_the_exact_supports_rounded_up(count: int) -> None:
     for case, rng, P, Q in pairs(count):
         if P.is_empty() or Q.is_empty():
