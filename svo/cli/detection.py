@@ -135,6 +135,8 @@ def watch(
             keep_description(the_plant, out)
             for text in alarms.notes:
                 note(text)
+            if alarms.before:
+                note(f"{alarms.alarms} keeps its {alarms.before} alarms of before")
             keep = alarms.add
         if state is not None:
             writable_file(state)
