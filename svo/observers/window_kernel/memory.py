@@ -27,7 +27,7 @@ REFACTOR = 60  # pivots between refactorisations
 LONG = 250  # pivots after which a program goes on with a cost that is disturbed by
 LARGE_JITTER = 1e7  # times the jitter, 1e-4 of the largest cost
 PIVOT_LIMIT = 10_000
-LARGEST = 2.0**200  # of a state: a window that reaches beyond says nothing any more, and floats would overflow
+LARGEST = 2.0**100  # of a state: a window that reaches beyond says nothing any more, and floats would overflow
 
 AT_LOWER, AT_UPPER, BASIC, AT_CENTRE = 0, 1, 2, 3
 OPTIMAL, EMPTY, STOPPED = 0, 1, 2

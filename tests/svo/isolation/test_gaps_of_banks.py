@@ -40,7 +40,7 @@ def observers(kind: Any, nominal: UncertainModel, fault: UncertainModel) -> tupl
 def test_a_bank_lives_through_a_gap_in_which_every_set_is_lost(kind: Any) -> None:
     bank = ArchitectureI(*observers(kind, plant(2.0), plant(2.0, w=2.0)))
     bank.update(NOTHING)
-    for _ in range(215):
+    for _ in range(115):
         verdict = bank.step([0.0], NOTHING)
         assert verdict.state == "nominal"
         assert all(not np.isnan(step.box).any() for step in verdict.steps.values())
@@ -63,7 +63,7 @@ def test_an_observer_that_starts_again_beside_a_lost_one_has_no_set_either() -> 
     """The nominal one, stable, is falsified while the other's set is lost: the hull of the survivors is everything."""
     bank = ArchitectureI(*observers(WindowObserver, chain(0.5), chain(2.0)), debounce=2)
     bank.update(NOTHING)
-    for _ in range(215):
+    for _ in range(115):
         bank.step([0.0], NOTHING)
     verdict = bank.step([0.0], [1e6])
     assert verdict.steps["nominal"].verdict == "falsified"
@@ -123,7 +123,7 @@ def test_faults_of_class_two_start_where_the_global_set_is_lost(promised: bool) 
         WindowObserver(every, start(every)),
     )
     bank.update(NOTHING)
-    for _ in range(210):
+    for _ in range(110):
         verdict = bank.step([0.0], NOTHING)
     y, states = 1e6, []
     for _ in range(6):

@@ -26,7 +26,7 @@ def lost(kind: Any, model: UncertainModel) -> Any:
 def test_a_set_outgrows_all_bounds_and_is_found_again(kind: Any) -> None:
     model = unstable(2.0)
     observer = kind(model, start(model))
-    for step in answers(observer, [[np.nan]] * 210):
+    for step in answers(observer, [[np.nan]] * 110):
         assert not np.isnan(step.box).any()
     assert (step.verdict, step.reason) == ("undecided", "outgrown")
     assert np.isinf(step.box).all()
@@ -37,7 +37,7 @@ def test_a_set_outgrows_all_bounds_and_is_found_again(kind: Any) -> None:
         step = observer.step(None, outputs)
         assert step.verdict == "consistent"
         assert step.box[0] <= x[k] <= step.box[1]
-    assert step.sample == 217
+    assert step.sample == 117
     assert observer.step(None, [1e6]).verdict == "falsified"
 
 
@@ -76,8 +76,8 @@ def test_an_input_beyond_all_bounds_is_no_silent_blindness(kind: Any, size: floa
         assert step.verdict == "falsified" or not np.isnan(step.box).any()
         if step.verdict == "falsified":
             break
-    # a state of 1e20 is one that a reading of 0 contradicts; beyond 2^200 nothing is said
-    assert steps[4][0] != "falsified" or size < 1e59
+    # a state of 1e20 is one that a reading of 0 contradicts; beyond 2^100 nothing is said
+    assert steps[4][0] != "falsified" or size < 1e30
     assert ("undecided", "outgrown") in steps or steps[-1][0] == "falsified"
 
 
@@ -111,7 +111,7 @@ def test_a_state_saved_in_a_gap_goes_on_bit_for_bit(kind: Any) -> None:
 def test_the_largest_set_is_where_a_set_starts_again_and_a_premise(kind: Any) -> None:
     model = unstable(2.0, largest=(-5.0, 5.0))
     observer = kind(model, start(model))
-    steps = list(answers(observer, [[np.nan]] * 203))
+    steps = list(answers(observer, [[np.nan]] * 103))
     assert {step.verdict for step in steps} == {"consistent"}
     at = observer.largest_at
     assert at is not None
