@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import finite_array
 from svo.schedule_table import ScheduleTable
 from svo.stack import OUTPUT_BLOCKS, STATE_BLOCKS
 
@@ -25,10 +26,10 @@ def along(model: UncertainModel, schedule: ArrayLike | None) -> UncertainModel:
         return model
     if schedule is None:
         raise ValueError("schedule is missing: the model has arrays or bounds that are functions of it")
-    values: Array = np.asarray(schedule, dtype=np.float64)
+    values: Array = finite_array("schedule", schedule)
     if values.ndim == 0 or len(values) == 0:
         raise ValueError(f"schedule has shape {values.shape}; expected (K, ...), one value a sample")
-    typical: Array = np.asarray(model.schedule, dtype=np.float64)
+    typical: Array = finite_array("schedule of the model", model.schedule)
     if typical.shape != values.shape[1:]:
         raise ValueError(f"schedule has shape {values.shape[1:]} at a sample; expected {typical.shape}")
     values = np.concatenate([typical[None], values])

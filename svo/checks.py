@@ -1,4 +1,4 @@
-"""Checks of a model's arrays; every error names the argument, what it is and what was expected."""
+"""Checks of what a user hands over, on the one door for numbers (`polytopes.checks`)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,66 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.checks import Shape, real_array, real_number, whole_number
+
+__all__ = [
+    "Array",
+    "check_disturbance_box",
+    "check_noise",
+    "finite_array",
+    "floats",
+    "is_count",
+    "is_finite_number",
+    "positive_number",
+    "readings",
+    "real_array",
+    "real_number",
+    "whole_number",
+]
+
 Array = NDArray[np.float64]
 
 
-def finite_array(name: str, value: Any) -> Array:
-    """A read-only copy as floats; ValueError if it is not numeric or not finite."""
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} is not numeric: {error}") from error
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} has shape {array.shape} and contains NaN or Inf; expected finite numbers")
+def finite_array(name: str, value: Any, *shapes: Shape, meaning: str = "") -> Array:
+    """Finite numbers as a read-only copy; errors as of `polytopes.checks.real_array`."""
+    array = real_array(name, value, *shapes, meaning=meaning)
     array.setflags(write=False)
     return array
 
 
+def readings(name: str, value: Any, *shapes: Shape, meaning: str = "") -> Array:
+    """Numbers of which some may be missing (NaN, masked, None): NaN there, and no infinity."""
+    return real_array(name, value, *shapes, meaning=meaning, missing=True)
+
+
+def floats(name: str, value: Any, *, missing: bool = False) -> Array:
+    """What comes at every sample, for a caller that checks shape and NaN: an array of floats goes through as it is."""
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous:
+        return value
+    if type(value) is list and all(type(v) is float for v in value):
+        return np.array(value)
+    return real_array(name, value, finite=False, missing=missing)
+
+
+def positive_number(name: str, value: Any, what: str) -> float:
+    """One finite number above zero; ``what`` says which, for the error."""
+    if not (is_finite_number(value) and value > 0):
+        raise ValueError(f"{name} is {value!r}; expected a positive {what}")
+    return float(value)
+
+
+def is_count(value: Any, least: int) -> bool:
+    """Whether a value is a whole number of at least so much; truth values are none."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) >= least
+
+
 def is_finite_number(value: Any) -> TypeGuard[float]:
     """Whether a value is one real number, neither NaN nor infinite."""
-    return isinstance(value, int | float | np.number) and not isinstance(value, complex) and bool(np.isfinite(value))
+    try:
+        real_number("", value)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def check_disturbance_box(lower: Array, upper: Array, nw: int) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import finite_array
+from svo.checks import finite_array, positive_number
 from svo.held import Varying, which_vary
 from svo.inside_sample import departure, exponential, growth, kept
 from svo.model import UncertainModel
@@ -21,9 +21,10 @@ _ROUNDED_UP = 1e-9  # relative: more than what sums of numbers >= 0, fewer than 
 
 def zero_order_hold(A: ArrayLike, B: ArrayLike, Ts: float) -> tuple[Array, Array]:
     """exp(A Ts) and int_0^Ts exp(A t) dt B, from one exponential of [[A B], [0 0]]; the nearest floats."""
-    A, B = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
+    A, B = finite_array("A", A, ("n", "n")), finite_array("B", B, ("n", "m"))
     n, m = B.shape
-    joint = exponential(np.block([[A, B], [np.zeros((m, n + m))]]), Ts)
+    seconds = positive_number("Ts", Ts, "sampling time in seconds")
+    joint = exponential(np.block([[A, B], [np.zeros((m, n + m))]]), seconds)
     return joint[:n, :n], joint[:n, n:]
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from svo.checks import real_array
 
 Array = NDArray[np.float64]
 
@@ -137,7 +140,7 @@ def _share(durations: Array, true: NDArray[np.bool_]) -> float:
 
 
 def _checked(time: ArrayLike, decision: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-    times, alarm = np.asarray(time, dtype=float), np.asarray(decision)
+    times, alarm = real_array("time", time, finite=False, missing=True), _flags(decision)
     if times.ndim != 1 or times.size < 2:
         raise ValueError(f"time has shape {times.shape}; expected (K,) with at least two samples")
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
@@ -145,3 +148,10 @@ def _checked(time: ArrayLike, decision: ArrayLike) -> tuple[Array, NDArray[np.bo
     if alarm.shape != times.shape or alarm.dtype != np.bool_:
         raise ValueError(f"decision has shape {alarm.shape} and type {alarm.dtype}; expected {times.shape} of bool")
     return times, alarm
+
+
+def _flags(decision: ArrayLike) -> NDArray[Any]:
+    """An array whose type and shape have not been looked at; a masked entry is no decision."""
+    if np.ma.is_masked(decision):
+        raise ValueError("decision has masked entries; expected True or False at each time. Fill or remove them")
+    return np.asarray(decision)

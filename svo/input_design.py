@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import finite_array, is_finite_number
 from svo.distinguish import Distinguishability, distinguishability
 from svo.model import UncertainModel
 from svo.model_pair import LEAST_SEPARATION, ModelPair
@@ -325,7 +326,7 @@ def _check_numbers(horizon: int, hold: int, margin: float) -> None:
     for name, value in (("horizon", horizon), ("hold", hold)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
             raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1")
-    if not (np.isfinite(margin) and margin > LEAST_SEPARATION):
+    if not (is_finite_number(margin) and margin > LEAST_SEPARATION):
         raise ValueError(f"margin is {margin}; expected a separation above {LEAST_SEPARATION:g} noise widths")
 
 
@@ -334,8 +335,8 @@ def _reference(reference: ArrayLike | None, horizon: int, count: int) -> Array:
         raise ValueError("plant_model has no inputs; expected one with inputs to design")
     if reference is None:
         return np.zeros((horizon, count))
-    values = np.asarray(reference, dtype=float)
-    if values.ndim != 2 or values.shape[1] != count or len(values) < horizon or not np.isfinite(values).all():
+    values = finite_array("reference", reference)
+    if values.ndim != 2 or values.shape[1] != count or len(values) < horizon:
         raise ValueError(
             f"reference has shape {values.shape}; expected finite numbers of shape (K, {count}) with K >= {horizon}"
         )
@@ -345,18 +346,23 @@ def _reference(reference: ArrayLike | None, horizon: int, count: int) -> Array:
 def _limits(limits: tuple[ArrayLike, ArrayLike], reference: Array) -> tuple[Array, Array]:
     """Bounds (N, nu) of the inputs."""
     try:
-        lower, upper = (np.broadcast_to(np.asarray(end, dtype=float), reference.shape) for end in limits)
+        lower, upper = limits
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"limits is {limits!r}; expected (lower, upper)") from error
+    ends = finite_array("lower limit", lower), finite_array("upper limit", upper)
+    try:
+        lower, upper = (np.broadcast_to(end, reference.shape) for end in ends)
     except (TypeError, ValueError) as error:
         raise ValueError(
             f"limits is {limits!r}; expected (lower, upper), each of shape ({reference.shape[1]},) or {reference.shape}"
         ) from error
-    if not (np.isfinite(lower).all() and np.isfinite(upper).all() and (lower <= upper).all()):
-        raise ValueError("limits are not finite, or a lower one is above its upper one; expected lower <= upper")
+    if not (lower <= upper).all():
+        raise ValueError("limits: a lower one is above its upper one; expected lower <= upper")
     return lower, upper
 
 
 def _weight(weight: ArrayLike | None, count: int) -> Array:
-    values = np.ones(count) if weight is None else np.asarray(weight, dtype=float)
-    if values.shape != (count,) or not np.isfinite(values).all() or (values <= 0).any():
+    values = np.ones(count) if weight is None else finite_array("weight", weight)
+    if values.shape != (count,) or (values <= 0).any():
         raise ValueError(f"weight is {weight!r}; expected {count} positive numbers, one an input")
     return values

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import readings, real_array
+
 if TYPE_CHECKING:
     from svo.plant import Columns
 
@@ -39,10 +41,9 @@ class Log:
     schedule: Array | None = field(default=None)
 
     def __post_init__(self) -> None:
-        time = np.asarray(self.time, dtype=float)
-        if time.ndim != 1:
-            raise ValueError(f"time has shape {time.shape}; expected one dimension, (K,)")
-        wrong = np.flatnonzero(~(np.isfinite(time) & (np.diff(time, prepend=-np.inf) > 0)))
+        time = real_array("time", self.time, ("K",), finite=False)
+        later = np.append(True, time[1:] > time[:-1])[: time.size]
+        wrong = np.flatnonzero(~(np.isfinite(time) & later))
         if wrong.size:
             raise ValueError(f"time[{wrong[0]}] is {time[wrong[0]]}; expected finite, strictly increasing seconds")
         object.__setattr__(self, "time", time)
@@ -50,10 +51,7 @@ class Log:
             value = getattr(self, name)
             if value is None and name in ("x", "schedule"):
                 continue
-            array = np.asarray(value)
-            if array.dtype.kind not in "biuf":
-                raise ValueError(f"{name} is of the type {array.dtype}; expected real numbers, NaN for a missing one")
-            array = array.astype(float, copy=False)
+            array = readings(name, value) if name in ("y", "x") else real_array(name, value)
             if array.shape[:1] != time.shape or (name != "schedule" and array.ndim != 2):
                 raise ValueError(
                     f"{name} has shape {array.shape}; expected ({time.size}, channels), one row a sample of time"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from svo.checks import real_array
 from svo.log import Log
 from svo.log_columns import columns_of_log, log_of_columns, wanted_columns
 from svo.optional import optional_import
@@ -37,18 +36,16 @@ def from_dataframe(frame: Any, columns: Columns, Ts: float) -> Log:
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         Naming the sample and the column.
     """
-    is_numeric = optional_import("pandas.api.types", "study", "data frames").is_numeric_dtype
+    optional_import("pandas", "study", "data frames")
     if columns.time not in frame.columns and frame.index.name == columns.time:
         frame = frame.reset_index()
     names = wanted_columns("the data frame", list(frame.columns), columns)
     cells = {}
     for name in names:
-        if not is_numeric(frame[name]):
-            raise ValueError(f"the data frame, column {name!r} has the type {frame[name].dtype}; expected numbers")
-        cells[name] = frame[name].to_numpy(dtype=float, na_value=np.nan)
+        cells[name] = real_array(f"the data frame, column {name!r}", frame[name], finite=False, missing=True)
     return log_of_columns("the data frame", cells, columns, Ts)
 
 
@@ -65,7 +62,7 @@ def from_xarray(dataset: Any, columns: Columns, Ts: float) -> Log:
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         Naming the sample and the variable.
     """
     names = wanted_columns("the data set", list(dataset.variables), columns)
@@ -78,9 +75,7 @@ def from_xarray(dataset: Any, columns: Columns, Ts: float) -> Log:
                 f"{columns.time!r} of shape {samples}"
             )
         values = dataset[name].to_numpy()
-        if values.dtype.kind not in "iuf":
-            raise ValueError(f"the data set, variable {name!r} has the type {values.dtype}; expected numbers")
-        cells[name] = values.astype(float)
+        cells[name] = real_array(f"the data set, variable {name!r}", values, finite=False, missing=True)
     return log_of_columns("the data set", cells, columns, Ts)
 
 

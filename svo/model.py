@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from svo.along_log import along
-from svo.checks import finite_array
+from svo.checks import finite_array, positive_number
 from svo.log import Log
 from svo.model_bounds import Bounds, bounds_of
 from svo.model_file import read_arrays
@@ -107,8 +107,7 @@ class UncertainModel:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainties", tuple(self.uncertainties))
-        if not (np.isfinite(self.Ts) and self.Ts > 0):
-            raise ValueError(f"Ts is {self.Ts}; expected a positive sampling time in seconds")
+        object.__setattr__(self, "Ts", positive_number("Ts", self.Ts, "sampling time in seconds"))
         object.__setattr__(self, "layout", self._measure())
         n = self.layout.n
         object.__setattr__(self, "physical_range", state_range("physical", self.physical, n, bounded=False))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import check_disturbance_box, check_noise, finite_array
+from svo.checks import check_disturbance_box, check_noise, finite_array, floats
 from svo.schedule_table import ScheduleTable, values_over
 
 Array = NDArray[np.float64]
@@ -45,11 +45,12 @@ class Bounds:
             return self.edges
         if self.table is not None:
             return self._split(self.table(schedule))
-        return self._checked(*(np.asarray(e(schedule), dtype=float) if callable(e) else e for e in self.edges))
+        edges = zip("wwn", self.edges, strict=True)
+        return self._checked(*(floats(name, e(schedule)) if callable(e) else e for name, e in edges))
 
     def over(self, schedule: ArrayLike) -> tuple[Array, Array, Array]:
         """See `UncertainModel.bounds_over`."""
-        values = np.asarray(schedule, dtype=float)
+        values = finite_array("schedule", schedule)
         if self.table is not None:
             return self._split(self.table.over(values))
         found = tuple(values_over(edge, values) for edge in self.edges)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import finite_array
 from svo.lifted_rows import LiftedSample, bounding_box, evaluate_with_rest, line_rows, set_rows
 from svo.model import UncertainModel
 from svo.normal_form import NormalForm, exponents_of, set_in
@@ -280,7 +281,7 @@ def _schedules(schedule: ArrayLike | None, horizon: int, needed: bool) -> list[A
         if needed:
             raise ValueError("schedule is missing: a model has arrays that are functions of it; give one a sample")
         return [None] * horizon
-    values = np.asarray(schedule, dtype=float)
+    values = finite_array("schedule", schedule)
     if values.ndim < 1 or len(values) < horizon:
         raise ValueError(f"schedule has shape {values.shape}; expected at least {horizon} samples, the horizon")
     return [float(v) if v.ndim == 0 else v for v in values[:horizon]]
@@ -295,9 +296,7 @@ def _inputs(u: ArrayLike | HPolytope | None, horizon: int, count: int) -> tuple[
         if count:
             raise ValueError(f"u is missing; expected an array ({horizon}, {count}) of inputs, or a set of them")
         return np.zeros((horizon, 0)), np.zeros((horizon, 0))
-    values = np.asarray(u, dtype=float)
+    values = finite_array("u", u)
     if values.ndim != 2 or values.shape[1] != count or len(values) < horizon:
         raise ValueError(f"u has shape {values.shape}; expected (K, {count}) with K >= {horizon}, the horizon")
-    if not np.isfinite(values).all():
-        raise ValueError("u contains NaN or Inf; expected finite inputs")
     return values[:horizon], values[:horizon]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from svo.checks import finite_array
 from svo.distinguish import Distinguishability, distinguishability
 from svo.input_design import InputDesign, design_input
 from svo.isolability import FaultFreeFlight, horizon_text, stated_faults
@@ -182,7 +183,7 @@ def _input_limits(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(plant, LimitsInputs):
         raise ValueError(f"plant {plant.name!r} has no input_limits (lower, upper); they are needed to design inputs")
     lower, upper = plant.input_limits
-    return np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    return finite_array("lower input limit", lower), finite_array("upper input limit", upper)
 
 
 def _limits(

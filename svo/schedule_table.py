@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import finite_array
+from svo.checks import finite_array, floats, real_number
 
 Array = NDArray[np.float64]
 
@@ -22,11 +22,11 @@ def values_over(value: Any, schedule: Array) -> Array:
     called once a sample.
     """
     if not callable(value):
-        array = np.asarray(value, dtype=np.float64)
+        array = floats("an array of the model", value)
         return np.broadcast_to(array, (len(schedule), *array.shape))
     if hasattr(value, "over"):
-        return np.asarray(value.over(schedule), dtype=np.float64)
-    return np.array([value(float(at) if at.ndim == 0 else at) for at in schedule], dtype=np.float64)
+        return floats("an array over the schedule", value.over(schedule))
+    return np.array([floats("an array at a schedule", value(float(at) if at.ndim == 0 else at)) for at in schedule])
 
 
 class ScheduleTable:
@@ -64,7 +64,8 @@ class ScheduleTable:
 
     def __call__(self, schedule: Any) -> Array:
         """The array at one value of the schedule."""
-        knots, at = self._knots, float(schedule)
+        knots = self._knots
+        at = schedule if isinstance(schedule, float) else real_number("schedule", schedule)
         if not math.isfinite(at):
             raise ValueError(f"schedule is {schedule!r}; expected a finite number")
         if at <= knots[0]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import finite_array
 from svo.log import Log
 
 if TYPE_CHECKING:
@@ -25,17 +26,13 @@ def simulate(
     schedule: ArrayLike | None,
 ) -> Log:
     """A run from x0 under u; see `UncertainModel.simulate`."""
-    inputs, x = np.asarray(u, dtype=float), np.asarray(x0, dtype=float)
-    if inputs.ndim != 2 or inputs.shape[1] != model.n_inputs or not len(inputs):
+    inputs = finite_array("u", u, ("samples", model.n_inputs))
+    x: Array = finite_array("x0", x0, (model.n_states,))
+    if not len(inputs):
         raise ValueError(f"u has shape {inputs.shape}; expected (samples, {model.n_inputs}), at least one sample")
     if not isinstance(rng, np.random.Generator):
         raise TypeError(f"rng is {rng!r}; expected a numpy Generator, such as np.random.default_rng(0)")
-    if x.shape != (model.n_states,):
-        raise ValueError(f"x0 has shape {x.shape}; expected ({model.n_states},)")
-    for name, array in (("u", inputs), ("x0", x)):
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} contains NaN or Inf; expected finite numbers")
-    values = None if schedule is None else np.asarray(schedule, dtype=float)
+    values = None if schedule is None else finite_array("schedule", schedule)
     if values is None and model.is_scheduled:
         raise ValueError("schedule is missing: the model has arrays that are functions of it; give one value a sample")
     if values is not None and values.shape[:1] != inputs.shape[:1]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import finite_array, floats
 from svo.schedule_table import ScheduleTable, values_over
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ class Stack:
             return self.table(schedule)
         stack = self.constant.copy()
         for block in self.scheduled:
-            value = np.asarray(block.function(schedule), dtype=float)
+            value = floats(block.name + block.owner, block.function(schedule))
             if value.shape != block.shape:
                 message = self.layout.shape_message(block.owner, block.name, value.shape)
                 raise ValueError(f"{message}, at schedule {schedule!r}")
@@ -90,7 +91,7 @@ class Stack:
 
     def over(self, schedule: ArrayLike) -> Array:
         """See `UncertainModel.stack_over`."""
-        values = np.asarray(schedule, dtype=float)
+        values = finite_array("schedule", schedule)
         if self.table is not None:
             return self.table.over(values)
         stacks = np.repeat(self.constant[None], len(values), axis=0)

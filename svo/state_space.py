@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import finite_array, real_number
+
 Array = NDArray[np.float64]
 
 
@@ -26,7 +28,7 @@ def state_space(sys: Any) -> StateSpace:
     Raises
     ------
     TypeError
-        If it has no such matrices.
+        If it has no such matrices, or they are complex or no numbers.
     ValueError
         If its dt is None, which leaves open whether it is continuous (but for scipy, where it means that).
     """
@@ -40,5 +42,5 @@ def state_space(sys: Any) -> StateSpace:
         raise TypeError(f"sys is a {type(sys).__name__}; expected a state-space system with A, B, C, D and dt")
     if dt is None:
         raise ValueError("sys has dt = None; expected 0 (continuous), True or the sampling time: set sys.dt")
-    A, B, C, D = (np.asarray(getattr(sys, name), dtype=float) for name in "ABCD")
-    return StateSpace(A, B, C, D, dt)
+    A, B, C, D = (finite_array(f"{name} of sys", getattr(sys, name)) for name in "ABCD")
+    return StateSpace(A, B, C, D, dt if dt is True else real_number("dt of sys", dt, least=0.0))

@@ -33,8 +33,8 @@ class Uncertainty:
     name: str = ""
 
     def __post_init__(self) -> None:
-        ends = finite_array("bounds of the uncertainty", self.bounds)
-        if ends.shape != (2,) or ends[0] > ends[1]:
+        ends = finite_array("bounds of the uncertainty", self.bounds, (2,), meaning="(lower, upper)")
+        if ends[0] > ends[1]:
             raise ValueError(
                 f"bounds of the uncertainty are {self.bounds}; expected (lower, upper) with lower <= upper"
             )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from svo.baselines.filter_kernel import filter_samples
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, Sample
-from svo.checks import finite_array
+from svo.checks import finite_array, readings
 from svo.log import Log
 
 Array = NDArray[np.float64]
@@ -148,7 +148,8 @@ class OnlineFilter:
         return self._advance(self._at(self._inputs(u)), y, u_next, schedule)
 
     def _inputs(self, u: ArrayLike | None) -> Array:
-        return np.zeros(self._filter.model.model.n_inputs) if u is None else finite_array("u", u)
+        size = self._filter.model.model.n_inputs
+        return np.zeros(size) if u is None else finite_array("u", u, (size,))
 
     def _advance(self, before: Sample | None, y: ArrayLike, u: ArrayLike | None, schedule: Any) -> Array:
         model = self._filter.model
@@ -156,7 +157,7 @@ class OnlineFilter:
         now = self._at(self._inputs(u))
         past = now if before is None else before
         white, states = np.empty((1, len(now.g))), np.empty((1, self._x.size))
-        measured = np.asarray(y, dtype=float)[None]
+        measured = readings("y", y, (model.model.n_outputs,))[None]
         bad = filter_samples(
             self._x, self._P, before is None, past.A[None].copy(), past.f[None],
             self._filter.process_noise * past.Q[None],

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import is_finite_number
+from svo.checks import finite_array, is_count, is_finite_number
 from svo.faults.blocks import (
     channels,
     check_channels,
@@ -115,13 +115,13 @@ class ActuatorFault:
         self._check_given("travel", _NEEDS_TRAVEL)
         self._check_given("frequency_hz", _NEEDS_FREQUENCY)
         self._check_given("seed", ("noise",))
-        if self.seed is not None and (not isinstance(self.seed, int | np.integer) or self.seed < 0):
+        if self.seed is not None and not is_count(self.seed, 0):
             raise ValueError(f"seed is {self.seed!r}; expected an integer >= 0")
         if self.travel is not None:
-            lower, upper = self.travel
-            if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+            lower, upper = finite_array("travel", self.travel, (2,), meaning="(lower, upper)")
+            if not lower < upper:
                 raise ValueError(f"travel is {self.travel}; expected finite (lower, upper) with lower < upper")
-        if self.frequency_hz is not None and not (np.isfinite(self.frequency_hz) and self.frequency_hz > 0):
+        if self.frequency_hz is not None and not (is_finite_number(self.frequency_hz) and self.frequency_hz > 0):
             raise ValueError(f"frequency_hz is {self.frequency_hz}; expected a positive number")
         if self.kind == "runaway" and not isinstance(self.profile, Step):
             raise ValueError(f"profile is {self.profile}; a runaway moves at its own rate, so give it a Step")
@@ -201,11 +201,7 @@ class ActuatorFault:
         if self.kind not in _NEEDS_TRAVEL:
             return np.zeros(commands.shape[-1])
         if held is not None:
-            kept = np.asarray(held, dtype=float)
-            if kept.shape != commands.shape[-1:]:
-                expected = commands.shape[-1:]
-                raise ValueError(f"held has shape {kept.shape}; expected {expected}, one deflection an input")
-            return kept
+            return finite_array("held", held, commands.shape[-1:], meaning="one deflection an input")
         if commands.ndim == 1:
             raise ValueError(f"held is missing: a {self.kind} needs the deflection achieved when the fault began")
         faulty = np.flatnonzero(self.profile.value(t) > 0)
@@ -214,12 +210,12 @@ class ActuatorFault:
     def _drawn(self, t: ArrayLike) -> Array:
         """Uniform numbers in [-1, 1], one a time, of the shape of t."""
         assert self.seed is not None
-        times = np.rint(np.asarray(t, dtype=float) / EDGE_TOLERANCE_S).astype(np.int64)
+        times = np.rint(finite_array("t", t) / EDGE_TOLERANCE_S).astype(np.int64)
         draws = [np.random.default_rng([self.seed, abs(int(k))]).uniform(-1.0, 1.0) for k in times.ravel()]
         return np.array(draws).reshape(times.shape)
 
     def _elapsed(self, t: ArrayLike) -> Array:
-        return np.maximum(np.asarray(t, dtype=float) - self.profile.start, 0.0)
+        return np.maximum(finite_array("t", t) - self.profile.start, 0.0)
 
     # -- the observer's model ----------------------------------------------------------------------
 

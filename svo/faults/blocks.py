@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
+from svo.checks import finite_array, floats
 from svo.model import Schedulable, UncertainModel, Uncertainty
 from svo.schedule_table import ScheduleTable, values_over
 
@@ -23,11 +24,11 @@ def mapped(function: Callable[..., Array], *values: Schedulable) -> Schedulable:
     """
     functions = [v for v in values if callable(v)]
     if not functions:
-        return function(*(np.asarray(v, dtype=float) for v in values))
+        return function(*(finite_array("an array of the model", v) for v in values))
     tables = [f for f in functions if isinstance(f, ScheduleTable)]
     if len(tables) == len(functions) and all(t.has_points_of(tables[0]) for t in tables):
         return ScheduleTable.of(
-            function, *(v if isinstance(v, ScheduleTable) else np.asarray(v, dtype=float) for v in values)
+            function, *(v if isinstance(v, ScheduleTable) else finite_array("an array of the model", v) for v in values)
         )
     return _Mapped(function, values)
 
@@ -40,7 +41,8 @@ class _Mapped:
     values: tuple[Schedulable, ...]
 
     def __call__(self, schedule: Any) -> Array:
-        return self.function(*(np.asarray(v(schedule) if callable(v) else v, dtype=float) for v in self.values))
+        arrays = (v(schedule) if callable(v) else v for v in self.values)
+        return self.function(*(floats("an array of the model", array) for array in arrays))
 
     def over(self, schedule: Array) -> Array:
         return self.function(*(values_over(v, schedule) for v in self.values))

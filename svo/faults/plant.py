@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import is_finite_number
+from svo.checks import finite_array, is_finite_number
 from svo.faults.profiles import Profile, check_profile
 from svo.model import UncertainModel, Uncertainty
 
@@ -83,8 +83,11 @@ class PlantFault:
             value = getattr(direction, name)
             if value is not None:
                 rows, columns = nominal.layout.block(name)
-                block = np.asarray(value(schedule) if callable(value) else value, dtype=float)
+                block = finite_array(f"{name} of the direction", value(schedule) if callable(value) else value)
                 block = block[:, None] if block.ndim == 1 else block
                 total[rows, columns][:, : block.shape[1]] = block  # a remainder has columns after those of w
-        change = float(self.delta(t)) * (total @ np.concatenate([x, u, [1.0], w]))
+        state = finite_array("x", x, (nominal.n_states,))
+        command = finite_array("u", u, (nominal.n_inputs,))
+        disturbance = finite_array("w", w, (nominal.n_disturbances,))
+        change = float(self.delta(t)) * (total @ np.concatenate([state, command, [1.0], disturbance]))
         return change[: nominal.n_states], change[nominal.n_states :]

@@ -13,6 +13,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import finite_array, is_finite_number, readings, real_array
+
 Array = NDArray[np.float64]
 
 EDGE_TOLERANCE_S = 1e-9
@@ -100,7 +102,7 @@ class Intermittent:
 
 
 def _elapsed(t: ArrayLike, start: float) -> Array:
-    return np.asarray(t, dtype=float) - start
+    return finite_array("t", t) - start
 
 
 def _started(elapsed: Array) -> NDArray[np.bool_]:
@@ -109,7 +111,8 @@ def _started(elapsed: Array) -> NDArray[np.bool_]:
 
 def at_times(name: str, t: ArrayLike, values: ArrayLike) -> Array:
     """A copy of a vector a time: (channels,) at one time, (K, channels) at K times."""
-    array, times = np.array(values, dtype=float), np.shape(t)
+    array = readings(name, values) if name == "y" else real_array(name, values)
+    times = finite_array("t", t).shape
     if array.ndim != len(times) + 1 or array.shape[:-1] != times:
         expected = "(channels,)" if not times else f"({', '.join(map(str, times))}, channels)"
         raise ValueError(f"{name} has shape {array.shape}; expected {expected} for t of shape {times}")
@@ -123,10 +126,10 @@ def check_profile(profile: Any) -> None:
 
 
 def _check_finite(name: str, value: float) -> None:
-    if not np.isfinite(value):
+    if not is_finite_number(value):
         raise ValueError(f"{name} is {value}; expected a finite time in seconds")
 
 
 def _check_positive(name: str, value: float) -> None:
-    if not (np.isfinite(value) and value > 0):
+    if not (is_finite_number(value) and value > 0):
         raise ValueError(f"{name} is {value}; expected a positive time in seconds")

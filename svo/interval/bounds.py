@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import real_array
+
 Array = NDArray[np.float64]
 
 
@@ -109,7 +111,7 @@ _RANGES = (
 
 
 def _checked(name: str, value: Any, lowest: float, highest: float) -> float | Array:
-    array = np.asarray(value, dtype=float)
+    array = real_array(f"{name} of the gain bounds", value, finite=False)
     if array.ndim > 1:
         raise ValueError(f"{name} of the gain bounds has shape {array.shape}; expected a number or (K,)")
     bad = np.flatnonzero(~((array >= lowest) & (array <= highest)))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import real_array
 from svo.interval.bounds import GainBounds
 from svo.interval.noise import NoiseCharacterization
 from svo.interval.predictor import Interval, IntervalPrediction, IntervalPredictor
@@ -184,7 +185,12 @@ class IntervalDetector:
         begun = perf_counter()
         measured = _measurement(y)
         if not self._started:
-            self.update(nan, schedule=schedule)
+            if schedule is not None:
+                raise ValueError(
+                    "step was called before update with a schedule: the first transition needs that of the first "
+                    "sample; call update(y0, schedule=...) first, with NaN if nothing is measured"
+                )
+            self.update(nan)
         self.predictor.step(_number("u", u), self._held, self._schedule)
         return self._judge(measured, schedule, begun)
 
@@ -243,10 +249,7 @@ class IntervalDetector:
 
 def _number(name: str, value: Any) -> float:
     if not isinstance(value, float):
-        array = np.asarray(value, dtype=float)
-        if array.size != 1:
-            raise ValueError(f"{name} has shape {array.shape}; expected one number")
-        value = array.item()
+        value = _only(name, real_array(name, value, finite=False))
     if not isfinite(value):
         raise ValueError(f"{name} is {value}; expected a finite number")
     return float(value)
@@ -254,10 +257,13 @@ def _number(name: str, value: Any) -> float:
 
 def _measurement(y: Any) -> float:
     if not isinstance(y, float):
-        array = np.asarray(y, dtype=float)
-        if array.size != 1:
-            raise ValueError(f"y has shape {array.shape}; expected one number, NaN if it is missing")
-        y = array.item()
+        y = _only("y", real_array("y", y, finite=False, missing=True))
     if abs(y) == np.inf:
         raise ValueError(f"y is {y}; expected a finite number, or NaN if it is missing")
     return float(y)
+
+
+def _only(name: str, array: Array) -> float:
+    if array.size != 1:
+        raise ValueError(f"{name} has shape {array.shape}; expected one number")
+    return float(array.item())

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import real_array
 from svo.interval.power_law import DEFAULT_EXPONENTS, PowerLaw, smallest_power_law
 from svo.interval.thresholds import checked_bounds, threshold_sequence
 
@@ -158,10 +159,10 @@ def _remainder(total: Array, mean: Array, count: NDArray[np.int64]) -> Array:
 
 def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
     several: Sequence[ArrayLike] = records  # type: ignore[assignment]
-    single = len(several) > 0 and np.ndim(several[0]) == 0
+    single = len(several) > 0 and (several[0] is None or np.isscalar(several[0]) or getattr(several[0], "ndim", 1) == 0)
     found = []
     for i, record in enumerate([records] if single else several):
-        signal = np.asarray(record, dtype=float)
+        signal = real_array(f"record {i}", record, finite=False, missing=True)
         if signal.ndim != 1:
             raise ValueError(f"record {i} has shape {signal.shape}; expected (n,), or a sequence of such records")
         signal = np.ascontiguousarray(signal[~np.isnan(signal)])

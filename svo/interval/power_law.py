@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import finite_array
 from svo.interval.thresholds import checked_bounds
 
 Array = NDArray[np.float64]
@@ -45,8 +46,8 @@ def smallest_power_law(bounds: ArrayLike, exponents: ArrayLike = DEFAULT_EXPONEN
     RuntimeError
         If the solver fails.
     """
-    lam, grid = checked_bounds(bounds), np.asarray(exponents, dtype=float)
-    if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
+    lam, grid = checked_bounds(bounds), finite_array("exponents", exponents)
+    if grid.ndim != 1 or not grid.size:
         raise ValueError(f"exponents has shape {grid.shape}; expected (m,) finite numbers, at least one")
     return min((_best(lam, float(gamma)) for gamma in grid), key=lambda law: float(np.mean(law.bounds(lam.size))))
 

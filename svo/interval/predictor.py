@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import is_finite_number, real_number
 from svo.interval import kernel
 from svo.interval.bounds import GainBounds, GainLaw
 from svo.interval.residual import dead_zone
@@ -156,6 +157,8 @@ class IntervalPredictor:
         return self._interval, GainBounds(gains.gc, used, gains.hc, gains.hr)
 
     def _advance(self, u: float, y: float | None, schedule: Any) -> tuple[GainBounds, float]:
+        if not isinstance(u, float):
+            u = real_number(f"u at sample {self._sample}", u)
         if not -np.inf < u < np.inf:
             raise ValueError(f"u is {u} at sample {self._sample}; expected a finite number")
         gains = self.gains if isinstance(self.gains, GainBounds) else self._bounds(u, y, schedule)
@@ -225,7 +228,7 @@ def _channel(log: Log, name: str) -> Array:
 
 
 def _checked_interval(center: float, radius: float) -> Interval:
-    if not (np.isfinite(center) and np.isfinite(radius) and radius >= 0):
+    if not (is_finite_number(center) and is_finite_number(radius) and radius >= 0):
         raise ValueError(f"the initial interval is {center} +- {radius}; expected finite numbers and a radius >= 0")
     return Interval(float(center), float(radius))
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import finite_array, is_finite_number, readings
+
 Array = NDArray[np.float64]
 
 
@@ -13,8 +15,8 @@ def dead_zone(y: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Array:
 
     Arrays broadcast; NaN in y stays NaN.
     """
-    values = np.asarray(y, dtype=float)
-    return values - np.clip(values, lower, upper)
+    values = readings("y", y)
+    return values - np.clip(values, finite_array("lower", lower), finite_array("upper", upper))
 
 
 def first_order_filter(signal: ArrayLike, pole: float) -> Array:
@@ -33,9 +35,7 @@ def first_order_filter(signal: ArrayLike, pole: float) -> Array:
     """
     from scipy.signal import lfilter
 
-    values = np.asarray(signal, dtype=float)
-    if values.ndim != 1:
-        raise ValueError(f"signal has shape {values.shape}; expected (K,)")
+    values = readings("signal", signal, ("K",))
     check_pole(pole)
     known = ~np.isnan(values)
     r = values[known]
@@ -49,5 +49,5 @@ def first_order_filter(signal: ArrayLike, pole: float) -> Array:
 
 def check_pole(pole: float) -> None:
     """Raise a ValueError for a pole outside [0, 1)."""
-    if not 0 <= pole < 1:
+    if not (is_finite_number(pole) and 0 <= pole < 1):
         raise ValueError(f"pole is {pole}; expected 0 <= pole < 1")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import real_array
 from svo.interval.residual import check_pole
 
 Array = NDArray[np.float64]
@@ -70,7 +71,7 @@ def threshold_sequence(bounds: ArrayLike, pole: float) -> Array:
 
 def checked_bounds(bounds: ArrayLike) -> Array:
     """Bounds lambda_q as a read-only array (qbar,), finite and not negative; ValueError otherwise."""
-    array = np.array(bounds, dtype=float)
+    array = real_array("bounds", bounds, finite=False)
     if array.ndim != 1 or not array.size:
         raise ValueError(f"bounds has shape {array.shape}; expected (qbar,), one bound a window length")
     wrong = np.flatnonzero(~(np.isfinite(array) & (array >= 0)))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import is_finite_number, real_array
 from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import restore_state, saved_state
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
@@ -30,6 +31,13 @@ class Sample:
     y: ArrayLike
     u_next: ArrayLike | None
     schedule: Any
+
+    @classmethod
+    def given(cls, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any) -> Sample:
+        """Copies of what a user hands over, whose arrays may hold the next sample when these are needed again."""
+        before = None if u is None else real_array("u", u, finite=False)
+        after = None if u_next is None else real_array("u_next", u_next, finite=False)
+        return cls(before, real_array("y", y, finite=False, missing=True), after, schedule)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """Those that are given, by name."""
@@ -80,8 +88,9 @@ class Bank(ABC):
         """
         if self._sample is not None:
             raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        steps = self._ask(lambda name: self._running[name].update(y0, u=u, schedule=schedule))
-        return self._conclude(0, steps, Sample(None, y0, u, schedule))
+        now = Sample.given(None, y0, u, schedule)
+        steps = self._ask(lambda name: self._running[name].update(now.y, u=now.u_next, schedule=schedule))
+        return self._conclude(0, steps, now)
 
     def step(
         self,
@@ -111,11 +120,12 @@ class Bank(ABC):
         """
         if self._sample is None:
             raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
+        now = Sample.given(u, y, u_next, schedule)
         if deadline is None:
-            steps = self._ask(lambda name: self._running[name].step(u, y, u_next=u_next, schedule=schedule))
+            steps = self._ask(lambda name: self._running[name].step(now.u, now.y, u_next=now.u_next, schedule=schedule))
         else:
-            steps = self._timed_steps(u, y, u_next, schedule, deadline)
-        return self._conclude(self._sample + 1, steps, Sample(u, y, u_next, schedule))
+            steps = self._timed_steps(now, deadline)
+        return self._conclude(self._sample + 1, steps, now)
 
     def late_update(self, y: ArrayLike, sample: int) -> Verdict:
         """A measurement that arrives after its sample; the verdict is about the newest one, and replaces the last.
@@ -262,12 +272,10 @@ class Bank(ABC):
 
     # -- inside ------------------------------------------------------------------------------------
 
-    def _timed_steps(
-        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any, deadline: float
-    ) -> dict[str, Step]:
-        end = perf_counter() + deadline
-        if not np.isfinite(deadline) or deadline <= 0:
+    def _timed_steps(self, now: Sample, deadline: float) -> dict[str, Step]:
+        if not (is_finite_number(deadline) and deadline > 0):
             raise ValueError(f"deadline is {deadline}; expected seconds > 0, or None")
+        end = perf_counter() + deadline
         for name in self._untimed:
             raise ValueError(
                 f"deadline is given, but the step of observer {name!r} ({type(self.observers[name]).__name__}) has "
@@ -277,7 +285,9 @@ class Bank(ABC):
 
         def timed(name: str) -> Step:
             share = max(0.0, end - perf_counter()) / next(left)
-            return self._running[name].step(u, y, u_next=u_next, schedule=schedule, deadline=share)
+            observer: Any = self._running[name]
+            answer: Step = observer.step(now.u, now.y, u_next=now.u_next, schedule=now.schedule, deadline=share)
+            return answer
 
         return self._ask(timed)
 

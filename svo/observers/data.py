@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import finite_array, floats, real_number
 from svo.log import Log
 from svo.model import UncertainModel
 
@@ -18,8 +19,8 @@ Array = NDArray[np.float64]
 
 
 def outputs_shaped(model: UncertainModel, y: ArrayLike) -> Array:
-    """A measurement (ny,) whose numbers have not been looked at."""
-    array = np.asarray(y, dtype=float)
+    """A measurement (ny,), NaN where a sensor is missing; its numbers have not been looked at."""
+    array = floats("y", y, missing=True)
     if array.shape != (model.n_outputs,):
         raise ValueError(f"y has shape {array.shape}; expected ({model.n_outputs},), one value a sensor")
     return array
@@ -41,7 +42,7 @@ def inputs_shaped(model: UncertainModel, name: str, u: ArrayLike | None, needed:
     if u is None:
         why = ", since D, a D_i or a channel shares it with the output" if name != "u" else ""
         raise ValueError(f"{name} is missing; expected shape ({size},){why}")
-    array = np.asarray(u, dtype=float)
+    array = floats(name, u)
     if array.shape != (size,):
         raise ValueError(f"{name} has shape {array.shape}; expected ({size},), one value an input")
     return array
@@ -61,6 +62,21 @@ def check_schedule(model: UncertainModel, schedule: Any) -> None:
         raise ValueError("schedule is missing: the model has arrays that are functions of it, so pass schedule=...")
 
 
+def check_may_start_by_step(model: UncertainModel) -> None:
+    """Raise an error if the first transition needs the matrices of a sample that there was not."""
+    if model.is_scheduled:
+        raise ValueError(
+            "step was called before update, and the model has arrays that are functions of the schedule: the first "
+            "transition needs those of the first sample; call update(y0, schedule=...) first, with NaN in y0 if "
+            "nothing is measured"
+        )
+
+
+def seconds_allowed(deadline: Any) -> float:
+    """A deadline [s], not negative and not NaN; infinite is none."""
+    return real_number("deadline", deadline, least=0.0, finite=False)
+
+
 def stack_at(model: UncertainModel, schedule: Any) -> Array:
     """The stack of a model at a sample, all finite."""
     check_schedule(model, schedule)
@@ -72,10 +88,7 @@ def stack_at(model: UncertainModel, schedule: Any) -> Array:
 
 def directions_of(directions: ArrayLike, n: int) -> Array:
     """Directions (k, n) of a support."""
-    rows = np.asarray(directions, dtype=float)
-    if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
-        raise ValueError(f"directions has shape {rows.shape}; expected finite numbers of shape (k, {n})")
-    return rows
+    return finite_array("directions", directions, ("k", n))
 
 
 def steps_of(observer: Any, log: Log, needs_next_input: bool) -> Iterator[Any]:

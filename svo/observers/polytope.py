@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope, warm_up
+from svo.checks import is_count, is_finite_number
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.normal_form import NormalForm, set_in
-from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
+from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.polytope_limits import readable, within_physical
 from svo.observers.polytope_restart import RestartingPolytope
 from svo.observers.polytope_sets import PublishedRecursion, Sample, SoundRecursion
@@ -85,13 +86,13 @@ class PolytopeObserver(RestartingPolytope):
     ) -> None:
         if not isinstance(model, UncertainModel):
             raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
-        if not isinstance(horizon, int | np.integer) or horizon < 1:
+        if not is_count(horizon, 1):
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1")
-        if not (np.isfinite(eps) and eps >= 0):
+        if not (is_finite_number(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
         coupled = _is_coupled(model)
         smallest = 2 * (model.n_states + (model.n_disturbances if coupled else 0))
-        if max_facets is not None and (not isinstance(max_facets, int | np.integer) or max_facets < smallest):
+        if max_facets is not None and not is_count(max_facets, smallest):
             raise ValueError(
                 f"max_facets is {max_facets!r}; expected an integer of at least {smallest}, or None for exact"
             )
@@ -159,7 +160,8 @@ class PolytopeObserver(RestartingPolytope):
         Raises
         ------
         ValueError
-            For a wrong shape, or an infinite or missing value. The observer is unchanged.
+            For a wrong shape, an infinite or missing value, or a scheduled model whose first call is not `update`. The
+            observer is unchanged.
         FacetLimitError
             In exact mode, when a set has too many facets, or Qhull fails on it. The observer is unchanged.
         UndecidedError
@@ -169,6 +171,7 @@ class PolytopeObserver(RestartingPolytope):
         inputs = inputs_of(self.model, "u", u, True)
         following = inputs_of(self.model, "u_next", u_next, self.model.uses_input_in_output)
         if self._number < 0:
+            check_may_start_by_step(self.model)
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
         sample = self._sample(self._number + 1, y, following, schedule)
         return self._answer(self._form.inputs(inputs), sample, y, begun)

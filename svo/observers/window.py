@@ -11,11 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import is_count, is_finite_number
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.normal_form import NormalForm
 from svo.observers import window_kernel as kernel
-from svo.observers.data import check_schedule, inputs_shaped, outputs_shaped, steps_of
+from svo.observers.data import (
+    check_may_start_by_step,
+    check_schedule,
+    inputs_shaped,
+    outputs_shaped,
+    seconds_allowed,
+    steps_of,
+)
 from svo.observers.given_units import arrival_in
 from svo.observers.proof import ArrivalSet
 from svo.observers.saved_state import check_model, check_unchanged, last_schedule, sealed, take_exactly
@@ -76,11 +84,11 @@ class WindowObserver(RestartingWindow):
     ) -> None:
         if not isinstance(model, UncertainModel):
             raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
-        if horizon is not None and (not isinstance(horizon, int | np.integer) or horizon < 1):
+        if horizon is not None and not is_count(horizon, 1):
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
-        if not (np.isfinite(eps) and eps >= 0):
+        if not (is_finite_number(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
-        if not isinstance(sign_split, int | np.integer) or sign_split < 0:
+        if not is_count(sign_split, 0):
             raise ValueError(f"sign_split is {sign_split!r}; expected a number of cells >= 0 (0 = convex hulls)")
         rows = template_rows(template, model.n_states)
         first = first_states(initial, model)
@@ -141,7 +149,7 @@ class WindowObserver(RestartingWindow):
         schedule : optional
             Scheduling value at the sample of y; it also gives the matrices of the next transition.
         deadline : float, optional
-            Seconds after which the programs stop where they are: the arrival set is then wider but still
+            Seconds >= 0 after which the programs stop where they are: the arrival set is then wider but still
             contains the state, and the verdict is "undecided" if emptiness could not be decided. What is left
             then takes a few microseconds a direction. The exact proof of an alarm, a few milliseconds once, is
             not cut short. Results depend on the machine's speed.
@@ -149,21 +157,23 @@ class WindowObserver(RestartingWindow):
         Raises
         ------
         ValueError
-            For a wrong shape, an infinite or missing value, or a schedule that gives no finite matrices. The
-            observer is unchanged.
+            For a wrong shape, an infinite or missing value, a schedule that gives no finite matrices, or a scheduled
+            model whose first call is not `update`. The observer is unchanged.
         """
         begun = perf_counter()
-        if self._falsified is not None:
-            return self._step("falsified", begun)
+        end = None if deadline is None else begun + seconds_allowed(deadline)
         outputs = outputs_shaped(self.model, y)
         inputs = inputs_shaped(self.model, "u", u, True)
         following = inputs_shaped(self.model, "u_next", u_next, self._wants_next_input)
+        if self._falsified is not None:
+            return self._step("falsified", begun)
+        if not self._started:
+            check_may_start_by_step(self.model)
         stack, (w_lower, w_upper, noise) = self._evaluate(schedule)
         if not self._started:
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
         if self.horizon is None and not self._lost and self._time + 1 >= self._size.N:
             self._grow()
-        end = None if deadline is None else begun + deadline
         return self._sample(False, inputs, following, outputs, stack, noise, (w_lower, w_upper), begun, end)
 
     def late_update(self, y: ArrayLike, sample: int) -> WindowStep:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import real_array
 from svo.model import UncertainModel
 from svo.normal_form import NormalForm
 from svo.observers.proof import ArrivalSet
@@ -29,10 +30,7 @@ def template_rows(template: str | ArrayLike, n: int) -> Array:
         if template != "box":
             raise ValueError(f"template is {template!r}; expected 'box' or an array (rows, {n}) of directions")
         return np.zeros((0, n))
-    rows = np.array(template, dtype=float)
-    if rows.ndim != 2 or rows.shape[1] != n or not np.isfinite(rows).all():
-        raise ValueError(f"template has shape {rows.shape}; expected finite directions of shape (rows, {n})")
-    return rows
+    return real_array("template", template, ("rows", n), meaning="directions")
 
 
 def channel_owners(model: UncertainModel) -> NDArray[np.int64]:

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import is_count, is_finite_number
 from svo.log import Log
 from svo.model import UncertainModel
 from svo.normal_form import NormalForm
 from svo.observers.constrained_zonotope import ConstrainedZonotope
-from svo.observers.data import inputs_of, outputs_of, stack_at, steps_of
+from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.proof import WindowSample
@@ -73,7 +74,7 @@ class ConstrainedZonotopeObserver:
     ) -> None:
         if not isinstance(model, UncertainModel):
             raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
-        if not (np.isfinite(eps) and eps >= 0):
+        if not (is_finite_number(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
         n = model.n_states
         generators = _limit("max_generators", max_generators, 8 * n, n)
@@ -373,7 +374,7 @@ class ConstrainedZonotopeObserver:
 def _limit(name: str, value: int | None, default: int, least: int) -> int:
     if value is None:
         return default
-    if not isinstance(value, int | np.integer) or value < least:
+    if not is_count(value, least):
         raise ValueError(f"{name} is {value!r}; expected an integer of at least {least}, or None for {default}")
     return int(value)
 

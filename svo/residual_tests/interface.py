@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from svo.checks import is_finite_number, readings, real_array
+
 Array = NDArray[np.float64]
 
 
@@ -86,6 +88,7 @@ class OnlineTest:
         ValueError
             If r is infinite.
         """
+        r = r if isinstance(r, float) else float(readings("r", r, ()))
         if np.isinf(r):
             raise ValueError(f"r is {r}; expected a finite residual, or NaN where there is none")
         if not np.isnan(r):
@@ -141,21 +144,21 @@ def above(statistic: Array, threshold: float) -> NDArray[np.bool_]:
 def check_finite(**values: float) -> None:
     """Refuse numbers that are not finite."""
     for name, value in values.items():
-        if not np.isfinite(value):
+        if not is_finite_number(value):
             raise ValueError(f"{name} is {value}; expected a finite number")
 
 
 def check_positive(**values: float) -> None:
     """Refuse numbers that are not finite and positive."""
     for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
+        if not (is_finite_number(value) and value > 0):
             raise ValueError(f"{name} is {value}; expected a positive number")
 
 
 def check_probability(**values: float) -> None:
     """Refuse numbers outside (0, 1)."""
     for name, value in values.items():
-        if not 0 < value < 1:
+        if not (is_finite_number(value) and 0 < value < 1):
             raise ValueError(f"{name} is {value}; expected a probability between 0 and 1, both excluded")
 
 
@@ -166,7 +169,7 @@ def check_count(name: str, value: int, least: int) -> None:
 
 
 def _checked(residual: ArrayLike) -> Array:
-    r = np.asarray(residual, dtype=float)
+    r = real_array("residual", residual, finite=False, missing=True)
     if r.ndim != 1:
         raise ValueError(f"residual has shape {r.shape}; expected (K,): a test takes one residual, so run one for each")
     if np.isinf(r).any():

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 
-from svo.checks import finite_array
+from svo.checks import finite_array, readings
 from svo.residual_tests.interface import (
     DecisionRecord,
     WindowTest,
@@ -104,7 +104,7 @@ class BoundedThreshold:
         ValueError
             If the residual is not (K,), K the length of the bounds.
         """
-        r, lower, upper = np.asarray(residual, dtype=float), np.asarray(self.lower), np.asarray(self.upper)
+        r, lower, upper = readings("residual", residual), np.asarray(self.lower), np.asarray(self.upper)
         if r.ndim != 1 or (lower.ndim and r.shape != lower.shape):
             expected = lower.shape if lower.ndim else "(K,)"
             raise ValueError(f"residual has shape {r.shape}; expected {expected}, one value a sample")

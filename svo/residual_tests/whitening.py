@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
+from svo.checks import finite_array
 from svo.residual_tests.interface import check_count, check_finite, check_positive
 
 Array = NDArray[np.float64]
@@ -53,8 +54,8 @@ class Whitening:
             If a run is too short, not finite, or the residuals do not vary.
         """
         check_count("order", order, 0)
-        runs = [np.asarray(r, dtype=float) for r in residuals]
-        if not runs or any(r.ndim != 1 or r.size <= order or not np.isfinite(r).all() for r in runs):
+        runs = [finite_array(f"run {i} of the residuals", r) for i, r in enumerate(residuals)]
+        if not runs or any(r.ndim != 1 or r.size <= order for r in runs):
             raise ValueError(f"residuals has runs of {[r.shape for r in runs]}; expected finite (K,), K > {order}")
         mean = float(np.concatenate(runs).mean())
         centred = [r - mean for r in runs]
@@ -68,7 +69,7 @@ class Whitening:
 
     def apply(self, residual: ArrayLike) -> Array:
         """The white residual (K,); before the first sample the residual is taken to have been at its mean."""
-        centred = np.asarray(residual, dtype=float) - self.mean
+        centred = finite_array("residual", residual) - self.mean
         return np.asarray(lfilter(np.append(1.0, -np.array(self.coefficients)), [1.0], centred)) / self.sigma
 
 
@@ -84,9 +85,7 @@ def normalised_sum(residual: ArrayLike, samples: int) -> Array:
         If the residual is not (K,), or N is below 1.
     """
     check_count("samples", samples, 1)
-    r = np.asarray(residual, dtype=float)
-    if r.ndim != 1:
-        raise ValueError(f"residual has shape {r.shape}; expected (K,)")
+    r = finite_array("residual", residual, ("K",))
     sums = np.full(r.size, np.nan)
     if r.size >= samples:
         sums[samples - 1 :] = np.lib.stride_tricks.sliding_window_view(r, samples).sum(axis=1)

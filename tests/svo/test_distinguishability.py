@@ -172,7 +172,7 @@ def test_an_observer_is_falsified_within_the_horizon_on_every_run(seed: int, cor
         ({"horizon": 0}, "horizon is 0; expected a number of samples >= 1"),
         ({"u": None}, r"u is missing; expected an array \(5, 1\)"),
         ({"u": np.zeros((4, 1))}, r"u has shape \(4, 1\); expected \(K, 1\) with K >= 5"),
-        ({"u": np.full((5, 1), np.nan)}, "u contains NaN or Inf"),
+        ({"u": np.full((5, 1), np.nan)}, "u contains NaN at"),
         ({"u": HPolytope.whole_space(1)}, "u is unbounded"),
         ({"initial": HPolytope.box([0, 0], [1, 1])}, "initial has dimension 2; expected 1"),
         ({"observer_initial": HPolytope.empty(1)}, "observer_initial is empty"),

@@ -166,7 +166,7 @@ def test_affine_bounds_lie_below_the_separation_of_other_inputs() -> None:
         ({"margin": 0.0}, "margin is 0.0; expected a separation above 1e-06"),
         ({"limits": ([1.0], [-1.0])}, "a lower one is above its upper one"),
         ({"limits": ([-1.0, 0.0], [1.0, 1.0])}, "limits is .* expected .lower, upper., each of shape"),
-        ({"limits": ([-np.inf], [1.0])}, "limits are not finite"),
+        ({"limits": ([-np.inf], [1.0])}, "limit contains an infinity"),
         ({"reference": np.zeros((2, 1))}, r"reference has shape \(2, 1\); expected .* \(K, 1\) with K >= 3"),
         ({"weight": [0.0]}, "weight is .* expected 1 positive numbers"),
         ({"observer_initial": [POINT, POINT]}, "observer_initial has 2 sets; expected 1"),

