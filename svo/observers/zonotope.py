@@ -165,8 +165,8 @@ class ConstrainedZonotopeObserver:
         Raises
         ------
         ValueError
-            For a wrong shape, an infinite or missing value, or a schedule that gives no finite matrices. The
-            observer is unchanged.
+            For a wrong shape, an infinite or missing value, a schedule that gives no finite matrices, or a scheduled
+            model whose first call is not `update`. The observer is unchanged.
         """
         begun = perf_counter()
         inputs = inputs_of(self.model, "u", u, True)
@@ -176,6 +176,7 @@ class ConstrainedZonotopeObserver:
             return self._answer("falsified", self._stages[-1], begun)
         data = self._data(following, outputs, schedule)
         if self._number < 0:
+            check_may_start_by_step(self.model)
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
         u = self._form.inputs(inputs)
         if self._readings is not None:
