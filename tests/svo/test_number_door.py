@@ -286,6 +286,7 @@ def forms(good: Any) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.filterwarnings("ignore:the matrix subclass")
 @pytest.mark.parametrize("name", [name for name in CASES if not name.startswith(("data", "design"))])
 def test_other_forms_of_the_same_numbers_are_taken(name: str) -> None:
     for label, form in forms(CASES[name].good).items():
