@@ -91,7 +91,7 @@ def test_missing_u_next_and_schedule_are_named() -> None:
     scheduled = cart(E=lambda s: [[0.0], [s]], schedule=0.1)
     with pytest.raises(ValueError, match="schedule is missing"):
         WindowObserver(scheduled, BOX).update([0.0])
-    with pytest.raises(ValueError, match="matrices at this schedule contain NaN or Inf"):
+    with pytest.raises(ValueError, match=r"E contains NaN at \[1, 0\]; expected numbers"):
         WindowObserver(scheduled, BOX).update([0.0], schedule=np.nan)
 
 
