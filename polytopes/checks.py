@@ -113,6 +113,8 @@ def _is_float_array(value: Any) -> bool:
 
 def _converted(name: str, value: Any, missing: bool) -> Floats:
     """The numbers of anything but a plain array of floats."""
+    if type(value) is int:
+        return np.array(_float_of(name, value))
     if hasattr(value, "iloc") and hasattr(value, "columns"):  # a frame: its columns may be of different types
         columns = [
             real_array(f"{name}[{label!r}]", value.iloc[:, j], finite=False, missing=missing)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,6 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import real_array, real_number
+
+_LONGEST = 200  # characters of a value in an error
+_KEY = re.compile(r"^\s*([\w.\"'-]+)\s*=", re.MULTILINE)
+_DOTTED = re.compile(r"(?:[\w-]{1,100}\s*\.\s*){50}")
+_LONG_NUMBER = re.compile(r"[0-9_]{4300,}")
 _KINDS = {str: "text in quotes", bool: "true or false", int: "a whole number", dict: "a table", list: "a list"}
 
 
@@ -52,7 +59,7 @@ class Table:
         if self.name:
             place.append(f"[{self.name}]")
         if key is not None:
-            place.append(f"key {key!r}")
+            place.append(f"key {shown(key)}")
         return DescriptionError(f"{', '.join(place)}: {message}")
 
     @contextmanager
@@ -65,10 +72,18 @@ class Table:
         except (ValueError, TypeError) as error:
             raise self.error(None, str(error)) from error
 
+    @contextmanager
+    def _errors_of(self, key: str) -> Iterator[None]:
+        """The same, of what is made from one key."""
+        try:
+            yield
+        except (ValueError, TypeError) as error:
+            raise self.error(key, str(error)) from error
+
     def text(self, key: str, default: str | None = None, choices: Sequence[str] = ()) -> str:
         value = str(self._value(key, str, default))
         if choices and value not in choices:
-            raise self.error(key, f"is {value!r}; expected one of {', '.join(choices)}")
+            raise self.error(key, f"is {shown(value)}; expected one of {', '.join(choices)}")
         return value
 
     def truth(self, key: str, default: bool) -> bool:
@@ -80,8 +95,9 @@ class Table:
     def number(self, key: str, default: float | None = None) -> float:
         value = self._value(key, None, default)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.error(key, f"is {value!r}; expected a number")
-        return float(value)
+            raise self.error(key, f"is {shown(value)}; expected a number")
+        with self._errors_of(key):
+            return real_number(key, value, finite=False)
 
     def file_beside(self, key: str, name: str) -> Path:
         """A file that a key names, relative to the TOML file: beside it, or in a folder beside it."""
@@ -93,14 +109,11 @@ class Table:
     def array(self, key: str) -> NDArray[np.float64]:
         """Numbers in brackets, nested for a matrix."""
         value = self._value(key, None, None)
-        try:
-            if not isinstance(value, list) or _has_other_than_numbers(value):
-                raise ValueError
-            array = np.array(value, dtype=float)
-        except ValueError:
+        if not isinstance(value, list) or _has_other_than_numbers(value) or not _has_rows_of_one_length(value):
             wanted = "[1, 2], or [[1, 2], [3, 4]] for a matrix with rows of one length"
-            raise self.error(key, f"is {value!r}; expected numbers in brackets such as {wanted}") from None
-        return array
+            raise self.error(key, f"is {shown(value)}; expected numbers in brackets such as {wanted}")
+        with self._errors_of(key):
+            return real_array(key, value, finite=False)
 
     def table(self, key: str, known: Sequence[str] | None = None) -> Table:
         """A table inside this one; an empty one if it is not there."""
@@ -114,7 +127,7 @@ class Table:
         """A list of tables inside this one; empty if it is not there."""
         value = self._value(key, list, [])
         if not all(isinstance(item, dict) for item in value):
-            raise self.error(key, f"is {value!r}; expected a list of tables such as [{{{known[0]} = ...}}]")
+            raise self.error(key, f"is {shown(value)}; expected a list of tables such as [{{{known[0]} = ...}}]")
         inner = [Table(self.path, f"{self._inside(key)}, entry {i}", item) for i, item in enumerate(value, start=1)]
         for item in inner:
             item.check_keys(known)
@@ -130,19 +143,58 @@ class Table:
             return default
         value = self.content[key]
         if kind is not None and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):
-            raise self.error(key, f"is {value!r}; expected {_KINDS[kind]}")
+            raise self.error(key, f"is {shown(value)}; expected {_KINDS[kind]}")
         return value
 
 
 def read_table(path: Path, known: Sequence[str]) -> Table:
     """The top of a TOML file."""
+    text = ""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        text = path.read_text(encoding="utf-8-sig")
+        if dotted := _DOTTED.search(text):  # the parser's time grows with the square of the parts
+            raise ValueError(f"{_place(text, dotted.start())}: a key has more than 50 parts")
+        content = tomllib.loads(text)
+    except RecursionError:
+        place = _place(text, _deepest(text))
+        raise ValueError(f"{path}, {place}: brackets are nested too deeply; expected a matrix in two of them") from None
+    except ValueError as error:
+        digits = _LONG_NUMBER.search(text)
+        if digits and not isinstance(error, tomllib.TOMLDecodeError):
+            size, place = len(digits.group()), _place(text, digits.start())
+            raise ValueError(f"{path}, {place}: a number has {size} digits; expected one that a float equals") from None
         raise ValueError(f"{path} is not TOML: {error}") from error
     table = Table(path, "", content)
     table.check_keys(known)
     return table
+
+
+def shown(value: Any) -> str:
+    """A value in an error, cut where it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a number of more digits than Python prints, or lists in lists
+        return f"a {type(value).__name__} that is too long to print"
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def _place(text: str, at: int) -> str:
+    """Line and key of a place in a TOML file."""
+    keys = _KEY.findall(text, 0, at)
+    line = f"line {text.count(chr(10), 0, at) + 1}"
+    return f"{line}, key {shown(keys[-1])}" if keys else line
+
+
+def _deepest(text: str) -> int:
+    """The place in a text that is inside of most brackets."""
+    depths = np.cumsum([(c in "[{") - (c in "]}") for c in text])
+    return int(np.argmax(depths)) if depths.size else 0
+
+
+def _has_rows_of_one_length(value: list[Any]) -> bool:
+    lengths = {len(row) if isinstance(row, list) else None for row in value}
+    flat = not any(isinstance(item, list) for row in value if isinstance(row, list) for item in row)
+    return flat and len(lengths) <= 1
 
 
 def _has_other_than_numbers(value: Any) -> bool:

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 _GROWING_START = 16
 _LARGEST_BASIS = 128
 _LARGEST_GROWING_BASIS = 256
+_MOST_BYTES = 8 * 2**30
 
 
 class WindowMemory:
@@ -90,6 +91,7 @@ class WindowMemory:
             nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps, block=self._block,
             K=min(rows, columns, largest) + 2, late=int(self._late),
         )  # fmt: skip
+        _check_room(self._size)
         w = self._arrays = kernel.allocate(self._size)
         w["T"][:n] = np.eye(n)
         w["T"][n:] = self._template
@@ -139,3 +141,16 @@ class WindowMemory:
             return given
         newest = replace(given.samples[-1], y=np.where(beyond, self._reading, given.samples[-1].y))
         return replace(given, samples=(*given.samples[:-1], newest))
+
+
+def _check_room(size: kernel.Sizes) -> None:
+    """Refuse a window whose rows, which are kept twice, no machine could hold, before they are allocated."""
+    nv, nr = size.nw + size.nq, size.ny + size.nh + 2 * size.nq
+    needed = 16 * (size.N + 1) * nr * (size.n + (size.N + 1) * nv)
+    if needed > _MOST_BYTES:
+        raise ValueError(
+            f"horizon makes a window of {size.N:.3g} steps, whose rows take {needed / 2**30:.3g} GB; expected at most "
+            f"{_MOST_BYTES // 2**30} GB: take a shorter one"
+            if size.N < 2**500
+            else "horizon is beyond all memory; expected a number of steps"
+        )

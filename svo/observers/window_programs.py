@@ -44,6 +44,11 @@ def check_numbers(data: tuple[Any, ...], form: NormalForm) -> None:
             raise ValueError(ENTRY_ERRORS[code].format(u=u * form.u, y=y * form.y))
 
 
+def _of_one_layout(data: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Copies of a sample's arrays, behind window, size and flag: kernels compile anew for each layout they meet."""
+    return (*data[:3], *(np.array(array, order="C") for array in data[3:]))
+
+
 class WindowPrograms(WindowMemory):
     """Verdicts about a window. "Falsified" is kept, with the proof that was checked."""
 
@@ -52,7 +57,7 @@ class WindowPrograms(WindowMemory):
         if self.sign_split or self._injection is not None:
             self._enter(data)
             return self._solve(kernel.ARRIVAL)
-        code, verdict, program = kernel.take(*data, self.eps, kernel.PIVOT_LIMIT)
+        code, verdict, program = kernel.take(*_of_one_layout(data), self.eps, kernel.PIVOT_LIMIT)
         self._check_entry(code, data)
         if code == kernel.OUTGROWN:
             raise Outgrown
@@ -65,7 +70,7 @@ class WindowPrograms(WindowMemory):
         injected, given = False, data
         if self._injection is not None:
             data, injected = self._inject(data)
-        code = kernel.enter(*data)
+        code = kernel.enter(*_of_one_layout(data))
         self._check_entry(code, given)
         w, s = self._arrays, self._time % (self._size.N + 1)
         if self._injection is not None:  # it is for outputs that w enters, where the clock has moved on by now

@@ -125,20 +125,6 @@ def test_the_arrays_of_a_copied_set_are_read_only() -> None:
         copy.deepcopy(HPolytope.box([-1.0], [1.0])).A[0, 0] = 5.0
 
 
-@pytest.mark.slow
-@later("B4", AssertionError, "another memory layout of y compiles in the middle of a run")
-def test_no_memory_layout_compiles_after_warm_up() -> None:
-    from svo.observers import window_kernel as kernel
-
-    two_gauges = cart().replace(C=np.eye(2), n=[0.05, 0.05])
-    observer = WindowObserver(two_gauges, initial=HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
-    observer.warm_up()
-    observer.update([0.0, 0.0])
-    before = len(kernel.take.signatures)
-    observer.step(np.zeros((2, 3))[:1, 1], np.zeros((2, 3))[:, 1])
-    assert len(kernel.take.signatures) == before
-
-
 # -- the face --------------------------------------------------------------------------------------------------------
 
 
