@@ -183,13 +183,6 @@ class PolytopeObserver(RestartingPolytope):
         limits = {"horizon": self.horizon, "max_facets": self.max_facets}
         return {"kind": "polytope", **limits, "eps": self.eps, "as_published": published}
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
-        published = isinstance(self._recursion, PublishedRecursion)
-        limits = {"horizon": self.horizon, "max_facets": self.max_facets}
-        return {"kind": "polytope", **limits, "eps": self.eps, "as_published": published}
-
     def state_dict(self) -> dict[str, NDArray]:
         """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
         facets = -1 if self.max_facets is None else self.max_facets
