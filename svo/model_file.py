@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.mat_file import read_mat
+from svo.mat_file import MatFile
 
 _MATRICES = ("A", "B", "E", "C", "D", "F")
 _VECTORS = ("a", "c", "n", "w")
@@ -25,7 +25,11 @@ def read_arrays(path: str | Path) -> dict[str, Any]:
     ValueError
         If the file is no MAT file of version 7.2 or older, has none of these variables, or one of the wrong shape.
     """
-    variables = read_mat(path)
+    file, wanted = MatFile.open(path), (*_MATRICES, *_VECTORS, "w_lower", "w_upper")
+    for name in wanted:
+        if file.kinds.get(name, "numbers") != "numbers":
+            raise ValueError(f"{path}: variable {name!r} is {file.kinds[name]}; expected real numbers, or another name")
+    variables = file.read(file.numeric)
     arrays: dict[str, Any] = {name: variables[name] for name in _MATRICES if name in variables}
     for name in (*_VECTORS, "w_lower", "w_upper"):
         if name in variables:

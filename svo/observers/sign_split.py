@@ -99,7 +99,7 @@ def _cover(lower: Array, upper: Array, boxes: list[tuple[Array, Array]]) -> bool
 
 
 def _meet(lower: Array, upper: Array, low: Array, high: Array) -> bool:
-    """Whether two boxes share an inner point, in every direction in which the first has width."""
+    """Whether two boxes share a point; touching is enough."""
     return bool((np.maximum(lower, low) <= np.minimum(upper, high)).all())
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from svo.log import Log
+from svo.log_columns import is_sampled
 
 
 def parts(**changes: Any) -> dict[str, Any]:
@@ -47,3 +48,10 @@ def test_a_schedule_is_a_number_or_an_array_a_sample() -> None:
 def test_mistakes_are_named(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Log(**parts(**changes))
+
+
+@pytest.mark.parametrize("Ts", [1e-4, 0.01, 0.3, 60.0])
+def test_a_step_is_the_sampling_time_within_one_percent_and_no_more(Ts: float) -> None:
+    for factor, taken in ((0.989, False), (0.991, True), (1.0, True), (1.009, True), (1.011, False), (2.0, False)):
+        assert is_sampled(0.0, factor * Ts, Ts) is taken
+        assert is_sampled(5 * Ts, (5 + factor) * Ts, Ts) is taken

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from scipy import signal, sparse
+from scipy.io import savemat
 
 import polytopes
 import svo
@@ -344,3 +345,19 @@ def test_a_complex_system_of_a_library_is_refused() -> None:
     rotating = signal.StateSpace([[0.9 + 0.2j, 0], [0, 0.9 - 0.2j]], [[1], [1]], [[1, 1]], [[0]], dt=0.1)
     with pytest.raises(TypeError, match="A of sys has dtype complex128; expected real numbers"):
         UncertainModel.from_statespace(rotating)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"),
+    [
+        (np.array([[1.0 + 1j]]), "complex"),
+        (sparse.csc_matrix([[1.0]]), "sparse"),
+        (np.array(["one"]), "text"),
+        ({"value": 1.0}, "struct"),
+    ],
+)
+def test_a_variable_of_a_file_that_holds_no_real_numbers_is_not_left_out(tmp_path: Path, value: Any, kind: str) -> None:
+    """Left out, B would be no input at all."""
+    savemat(tmp_path / "plant.mat", {"A": [[0.5]], "B": value, "C": [[1.0]], "other": value})
+    with pytest.raises(ValueError, match=f"variable 'B' is .*{kind}.*expected real numbers"):
+        UncertainModel.from_mat(tmp_path / "plant.mat", Ts=0.1)

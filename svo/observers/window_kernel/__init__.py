@@ -1,4 +1,4 @@
-"""Compiled kernel of the moving-horizon window; `svo.observers.window` drives it, nothing else should.
+"""Compiled kernel of the moving-horizon window: the observers and their proofs use it, nothing outside `svo.observers`.
 
 memory        every array of a window, and its compiled type
 factors      an uncertainty as a sum of channels, and what that leaves out
