@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Place = Callable[[int], str]
 
-# Relative: a step is taken for Ts if |step - Ts| <= 0.01 Ts. The model then reckons with Ts: what the difference does to
-# the plant is for the user's bounds to hold, no set is widened by it.
+# Relative: a step is taken for Ts if |step - Ts| <= 0.01 Ts. The model then reckons with Ts: what the difference does
+# to the plant is for the user's bounds to hold, no set is widened by it.
 TIME_TOLERANCE = 0.01
 
 
