@@ -5,16 +5,27 @@ coefficients are, and no tolerance takes a dependent row for an independent one.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
-from polytopes.exact import ZERO, Multipliers, rational, rational_matrix, rational_vector, row_to_floats, to_floats
+from polytopes.exact import (
+    ZERO,
+    Multipliers,
+    power_of_two,
+    rational,
+    rational_matrix,
+    rational_vector,
+    row_to_floats,
+    to_floats,
+)
 
 Floats = NDArray[np.float64]
+_EPS = float(np.finfo(np.float64).eps)
+_NO_BITS = 2**20  # exponent of the last bit of zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,20 +94,47 @@ class AffineSet:
         magnitude = np.abs(A) @ np.abs(self.basis)
         cancelled = (np.abs(reduced) < 1e-3 * magnitude).any(axis=1) if self.free else np.ones(len(b), bool)
         for i in np.flatnonzero(cancelled).tolist():
-            row, constant = self._restricted(A[i], b[i])
+            row, constant = self.restricted_row(A[i], b[i])
             reduced[i], rhs[i] = to_floats(row), to_floats([constant])[0]
         return reduced, rhs
+
+    def restriction_errors(self, A: Floats, b: Floats) -> tuple[Floats, Floats]:
+        """Bounds of what `restrict` rounds: arrays (m, free) and (m,), zero for sums that are floats all along."""
+        solution = np.hstack([self.basis, self.point[:, None]])
+        reach = np.abs(A) @ np.abs(solution)
+        reach[:, -1] += np.abs(b)
+        errors = (self.dim + 6) * _EPS * reach
+        if not self._rounded:
+            errors[exact_sums(A, b, solution, reach)] = 0.0
+        return errors[:, :-1], errors[:, -1]
+
+    @cached_property
+    def _rounded(self) -> bool:
+        """Whether an entry of the basis or the point is not exactly what it stands for."""
+        free = len(self.free)
+        exact = [self.solved[k, q] for k in range(len(self.pivots)) for q in range(free + 1)]
+        return any(rational(v) != u for u, v in zip(exact, to_floats(exact), strict=True))
+
+    def in_units(self, exponents: NDArray[np.int64]) -> "AffineSet":
+        """The same set in coordinates ``x_j = 2^exponents[j] z_j``."""
+        entries = []
+        for k, j in enumerate(self.pivots):
+            powers = [*(exponents[self.free] - exponents[j]).tolist(), -int(exponents[j])]
+            entries += [self.solved[k, q] * power_of_two(p) for q, p in enumerate(powers)]
+        solved = fmpq_mat(len(self.pivots), len(self.free) + 1, entries)
+        return replace(self, solved=solved)
 
     def restrict_exactly(self, A: Floats, b: Floats) -> tuple[Floats, Floats]:
         """The same in rationals throughout, each row up to a positive factor (see `row_to_floats`)."""
         if not self.pivots:
             return A, b
-        exact = [self._restricted(row, value) for row, value in zip(A, b, strict=True)]
+        exact = [self.restricted_row(row, value) for row, value in zip(A, b, strict=True)]
         table = [row_to_floats(coefficients, constant) for coefficients, constant in exact]
         both = np.array(table).reshape(len(b), len(self.free) + 1)
         return both[:, :-1], both[:, -1]
 
-    def _restricted(self, row: Floats, rhs: float) -> tuple[list[fmpq], fmpq]:
+    def restricted_row(self, row: Floats, rhs: float) -> tuple[list[fmpq], fmpq]:
+        """One row ``row'x <= rhs`` on the set, exactly: its coefficients in the free coordinates and its constant."""
         exact = rational_vector(row)
         coefficients, constant = [exact[j] for j in self.free], rational(rhs)
         for k, j in enumerate(self.pivots):
@@ -107,7 +145,7 @@ class AffineSet:
         return coefficients, constant
 
 
-def affine_set(C: Floats, d: Floats, first: Sequence[int] = ()) -> AffineSet:
+def affine_set(C: Floats, d: Floats, first: Sequence[int] = (), units: NDArray[np.int64] | None = None) -> AffineSet:
     """Solve ``C x = d`` exactly.
 
     Parameters
@@ -115,11 +153,13 @@ def affine_set(C: Floats, d: Floats, first: Sequence[int] = ()) -> AffineSet:
     C, d : arrays (q, n) and (q,)
     first : sequence of int
         Coordinates to solve for before any other.  The solved row of another coordinate has no entry in them.
+    units : array (n,) of int, optional
+        Exponents of two: the coordinates in which large pivots are looked for are ``x_j / 2^units[j]``.
     """
     q, n = C.shape
     if q == 0:
         return AffineSet(n, [], list(range(n)), fmpq_mat(0, n + 1), None)
-    order = _pivot_order(C, list(first))
+    order = _pivot_order(C if units is None else _in_units(C, units), list(first))
     table = rational_matrix(np.hstack([C[:, order], d[:, None]]))
     reduced, rank = table.rref()
     leading = [next(j for j in range(n + 1) if reduced[k, j] != 0) for k in range(rank)]
@@ -129,6 +169,35 @@ def affine_set(C: Floats, d: Floats, first: Sequence[int] = ()) -> AffineSet:
     pivots, free = [int(order[j]) for j in leading], [int(order[j]) for j in columns]
     entries = [reduced[k, j] for k in range(rank) for j in [*columns, n]]
     return AffineSet(n, pivots, free, fmpq_mat(rank, len(columns) + 1, entries), None)
+
+
+def _in_units(C: Floats, units: NDArray[np.int64]) -> Floats:
+    """Columns times powers of two, rows of zeros as they are and others with a largest entry of about one."""
+    mantissas, powers = np.frexp(C)
+    powers = np.where(C != 0.0, powers + units, -(2**40))
+    top = powers.max(axis=1, keepdims=True)
+    return np.where(C != 0.0, np.ldexp(mantissas, np.maximum(powers - top, -2000)), 0.0)
+
+
+def exact_sums(A: Floats, b: Floats, solution: Floats, reach: Floats) -> NDArray[np.bool_]:
+    """Entries of ``A solution`` (b added to the last column) of which no partial sum is rounded.
+
+    All its terms are multiples of one power of two, and their sizes sum up to `reach`.
+    """
+    finest = np.full(reach.shape, _NO_BITS)
+    finest[:, -1] = _finest(b)
+    of_rows, of_solution = _finest(A), _finest(solution)
+    for k in range(A.shape[1]):
+        finest = np.minimum(finest, of_rows[:, k, None] + of_solution[k])
+    return np.asarray(np.frexp(reach)[1] - finest < 52)
+
+
+def _finest(values: Floats) -> NDArray[np.int64]:
+    """Exponent of the last bit of each number, huge for zero."""
+    mantissas, powers = np.frexp(values)
+    bits = np.ldexp(mantissas, 53).astype(np.int64)
+    last = np.frexp((bits & -bits).astype(np.float64))[1] - 1
+    return np.where(values != 0.0, powers - 53 + last, _NO_BITS)
 
 
 def _pivot_order(C: Floats, first: list[int]) -> NDArray[np.int64]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from polytopes.emptiness import combined_value, float_combination, strictly_inside
 from polytopes.errors import EmptySetError, UndecidedError
-from polytopes.exact_simplex import affordable, exact_feasibility
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
 
@@ -38,13 +38,17 @@ def implicit_equalities(P: Rows) -> list[int]:
 def _equalities_of_a_proof(P: Rows) -> list[int]:
     """Rows that carry a proof that P has no strict point; empty if it has one."""
     program = P.program
-    if not affordable(*P.A.shape):
+    if strictly_inside(program, program.centre):
+        return []
+    combination = float_combination(P, program)
+    if combination is not None and combined_value(P, combination) == 0:
+        return sorted(combination.inequality)
+    if not program.exact.affordable:
         raise UndecidedError(f"cannot tell whether a thin set of {P.A.shape[0]} rows is flat: too large to do exactly.")
-    kept = program.kept
-    outcome = exact_feasibility(P.A[kept], P.b[kept], program.flat, program.interior.point, strictly=True)
+    outcome = program.exact.only(program.kept).feasible(program.interior.point, strictly=True)
     if outcome.status == "limit":
         raise UndecidedError("cannot tell whether a thin set is flat: the rational simplex reached its pivot limit.")
-    return [] if outcome.status == "reached" else [int(kept[i]) for i in outcome.multipliers]
+    return [] if outcome.status == "reached" else [int(program.kept[i]) for i in outcome.multipliers]
 
 
 def _made_explicit(P: Rows, rows: list[int]) -> Rows:

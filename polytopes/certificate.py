@@ -8,9 +8,10 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
-from polytopes.exact import ZERO, Multipliers, combine, rational, rational_matrix, refutes
+from polytopes.exact import ZERO, Multipliers, combine, power_of_two, rational, rational_matrix, refutes
 
 Floats = NDArray[np.float64]
+_ZERO_WEIGHT = 1e-13  # of the largest float multiplier: below, a row takes no part in a proof
 
 
 class HasRows(Protocol):
@@ -95,32 +96,31 @@ def _parse(data: Mapping[str, Any], part: str) -> Multipliers:
     return multipliers
 
 
-def exact_certificate(P: HasRows, weights: Floats) -> Certificate | None:
-    """Exact certificate on the support of float multipliers; None if that support carries no proof.
+def exact_combination(P: HasRows, weights: Floats, powers: NDArray[np.int64]) -> Certificate | None:
+    """Exact multipliers, not all zero, with ``lambda'A + mu'C = 0`` on the support of float ones; None if it has none.
 
-    The multipliers of the support solve ``lambda'A + mu'C = 0`` in rationals.  The largest ones are solved for, so that
-    rounding is absorbed where it cannot change a sign; any that the equations leave free keep their float values.
+    The largest ones are solved for, so that rounding is absorbed where it cannot change a sign; any that the equations
+    leave free keep their float values.  What they combine the right-hand sides to is for the caller to see.
 
     Parameters
     ----------
     P : object with rows
     weights : array (m,)
-        Approximate Farkas multipliers, nonnegative up to rounding.
+        Approximate multipliers of the rows times ``2^powers``, nonnegative up to rounding.
+    powers : array (m,) of int
     """
-    support = np.flatnonzero(weights > 1e-13 * np.max(weights, initial=0.0))
+    support = np.flatnonzero(weights > _ZERO_WEIGHT * np.max(weights, initial=0.0))
     support = support[np.argsort(-weights[support], kind="stable")]
-    q, k = P.C.shape[0], support.size
-    if k == 0:
+    if not support.size:
         return None
-    leader = rational(weights[support[0]])
+    exact = [rational(weights[i]) * power_of_two(int(powers[i])) for i in support]
     columns = np.vstack([P.C, P.A[support[1:]], P.A[support[:1]]]).T
-    solution = _solve_free(rational_matrix(columns), [rational(w) for w in weights[support[1:]]], leader)
-    if solution is None:
+    solution = _solve_free(rational_matrix(columns), exact[1:], exact[0])
+    if solution is None or any(v < 0 for v in solution[P.d.size :]):
         return None
-    equality = {j: v for j, v in enumerate(solution[:q]) if v != 0}
-    lam = {int(i): v for i, v in zip(support[1:], solution[q:], strict=True) if v != 0}
-    certificate = Certificate({int(support[0]): leader, **lam}, equality)
-    return certificate if certificate.verify(P) else None
+    equality = {j: v for j, v in enumerate(solution[: P.d.size]) if v != 0}
+    inequality = {int(i): v for i, v in zip(support[1:], solution[P.d.size :], strict=True) if v != 0}
+    return Certificate({int(support[0]): exact[0], **inequality}, equality)
 
 
 def complete_certificate(P: HasRows, inequality: Multipliers) -> Certificate:

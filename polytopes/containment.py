@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.rows import Rows
-from polytopes.support import known_nonempty, maxima
+from polytopes.support import known_nonempty
 
 Floats = NDArray[np.float64]
 
@@ -25,9 +25,8 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> bool:
     if not known_nonempty(Q):
         return True
     normals, rhs = np.vstack([P.A, P.C, -P.C]), np.concatenate([P.b, P.d, -P.d])
-    result = maxima(Q, normals)
-    assert result is not None  # Q has a point
-    return bool((result.values <= rhs + tol * np.linalg.norm(normals, axis=1)).all())
+    farthest = Q.program.estimate(normals)
+    return bool((farthest <= rhs + tol * np.linalg.norm(normals, axis=1)).all())
 
 
 def equal_sets(P: Rows, Q: Rows, tol: float) -> bool:

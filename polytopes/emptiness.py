@@ -1,15 +1,20 @@
-"""Is a set of rows empty?  Three answers: a point, a proof, or a reason why neither was found."""
+"""Is a set of rows empty?  Three answers: a point, a proof, or a reason why neither was found.
+
+Floats propose, exact arithmetic disposes: a point counts if its slacks exceed what was rounded, multipliers if they can
+be completed to exact ones.  Multipliers that combine the rows to ``0 <= 0`` show rows that hold with equality all over
+the set; made explicit, they leave a smaller question (facial reduction, Borwein and Wolkowicz 1981).
+"""
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from flint import fmpq
 from numpy.typing import NDArray
 
-from polytopes.certificate import Certificate, HasRows, complete_certificate, exact_certificate
-from polytopes.exact import to_floats
-from polytopes.exact_simplex import affordable, exact_feasibility
-from polytopes.linear_program import Program
+from polytopes.certificate import Certificate, HasRows, complete_certificate, exact_combination
+from polytopes.exact import ZERO, Multipliers, combine, to_floats
+from polytopes.linear_program import Program, prepare
 
 Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
@@ -36,11 +41,22 @@ class Emptiness:
     reason: str
 
 
+@dataclass(frozen=True, eq=False)
+class _Face:
+    """The rows of a set with some of its inequalities as equalities, the last ones."""
+
+    A: Floats
+    b: Floats
+    C: Floats
+    d: Floats
+
+
 def decide_emptiness(P: HasRows, program: Program) -> Emptiness:
     """Decide emptiness of the rows of P, exactly on the floats they are.
 
     A float solution settles clear cases: a point whose slacks exceed their rounding error, or multipliers that can be
-    completed to an exact certificate.  Flat and nearly empty sets go to the rational simplex.
+    completed to an exact certificate.  What is flat is decided on its affine hull, what is thinner than rounding by the
+    rational simplex, up to its size (see `affordable`) and its limit of pivots.
 
     Parameters
     ----------
@@ -51,33 +67,77 @@ def decide_emptiness(P: HasRows, program: Program) -> Emptiness:
     if program.flat.contradiction is not None:
         return _empty(P, Certificate({}, program.flat.contradiction), "the equalities contradict each other")
     if program.violated is not None:
-        certificate = exact_certificate(P, np.eye(1, P.b.size, program.violated)[0])
-        if certificate is not None:
-            return _empty(P, certificate, f"row {program.violated} fails wherever the equalities hold")
+        proof = exact_combination(P, np.eye(1, P.b.size, program.violated)[0], program.exact.rows)
+        if proof is not None and combined_value(P, proof) < 0:
+            return _empty(P, proof, f"row {program.violated} fails wherever the equalities hold")
     interior = program.interior
-    if _strictly_inside(P, interior.point):
+    if strictly_inside(program, interior.centre):
         return Emptiness("nonempty", interior.point, None, "a point with slack beyond rounding")
-    if interior.radius < 0.0 or not interior.reliable:
-        certificate = exact_certificate(P, interior.multipliers)
-        if certificate is not None:
-            return _empty(P, certificate, "multipliers of the largest ball, completed exactly")
-    if not affordable(*P.A.shape):
+    combination = float_combination(P, program)
+    if combination is not None:
+        value = combined_value(P, combination)
+        if value < 0:
+            return _empty(P, combination, "multipliers of the largest ball, completed exactly")
+        if value == 0:
+            return _decide_on_face(P, combination)
+    if not program.exact.affordable:
         return Emptiness("undecided", None, None, _too_close(P, interior.radius))
     return _decide_exactly(P, program)
 
 
-def _strictly_inside(P: HasRows, x: Floats) -> bool:
-    """Whether floats prove ``A x < b`` (no equalities): every slack exceeds the rounding error of its computation."""
-    if P.C.shape[0] or not np.isfinite(x).all():
+def strictly_inside(program: Program, z: Floats) -> bool:
+    """Whether floats prove that a point z (free,) in the units of a program satisfies every row strictly.
+
+    Every slack must exceed the rounding error of its computation and of the elimination of equalities; rows that are
+    constant on the affine set are checked already.
+    """
+    if program.violated is not None or not np.isfinite(z).all():
         return False
-    slack = P.b - P.A @ x
-    error = (x.size + 3) * _EPS * (np.abs(P.A) @ np.abs(x) + np.abs(P.b))
-    true_by_itself = ~P.A.any(axis=1) & (P.b >= 0)
-    return bool(((slack > error) | true_by_itself).all())
+    size = np.abs(z)
+    slack = program.rhs - z @ program.AT
+    error = (z.size + 3) * _EPS * (size @ np.abs(program.AT) + np.abs(program.rhs))
+    if program.flat.pivots:
+        of_rows, of_rhs = program.errors
+        error += (of_rows @ size + of_rhs) * (1.0 + (z.size + 3) * _EPS)
+    return bool((slack > error).all())
+
+
+def float_combination(P: HasRows, program: Program) -> Certificate | None:
+    """Exact multipliers with ``lambda'A + mu'C = 0``, lambda >= 0, near those of the largest ball; None if none are."""
+    if program.interior.radius > 0.0 and program.interior.reliable and not program.thin:
+        return None
+    weights, powers = np.zeros(P.b.size), np.zeros(P.b.size, np.int64)
+    weights[program.kept], powers[program.kept] = program.interior.multipliers, program.row_powers
+    return exact_combination(P, weights, powers)
+
+
+def combined_value(P: HasRows, combination: Certificate) -> fmpq:
+    """``lambda'b + mu'd``, exactly."""
+    return combine(P.A, P.b, combination.inequality)[1] + combine(P.C, P.d, combination.equality)[1]
+
+
+def _decide_on_face(P: HasRows, combination: Certificate) -> Emptiness:
+    """Decide with the rows of a combination to ``0 <= 0`` as equalities, which they are all over the set."""
+    fixed = sorted(combination.inequality)
+    others = np.setdiff1d(np.arange(P.b.size), fixed)
+    face = _Face(P.A[others], P.b[others], np.vstack([P.C, P.A[fixed]]), np.append(P.d, P.b[fixed]))
+    answer = decide_emptiness(face, prepare(face.A, face.b, face.C, face.d))
+    if answer.certificate is None:
+        return Emptiness(answer.status, answer.witness, None, f"{answer.reason}, where rows {fixed} hold with equality")
+    inequality: Multipliers = {int(others[i]): v for i, v in answer.certificate.inequality.items()}
+    equality = {k: v for k, v in answer.certificate.equality.items() if k < P.d.size}
+    signed = {i: answer.certificate.equality.get(P.d.size + k, ZERO) for k, i in enumerate(fixed)}
+    times = max(max(-v / combination.inequality[i] for i, v in signed.items()), ZERO)
+    for i, v in signed.items():
+        inequality[i] = v + times * combination.inequality[i]
+    for k, v in combination.equality.items():
+        equality[k] = equality.get(k, ZERO) + times * v
+    proof = Certificate({i: v for i, v in inequality.items() if v != 0}, {k: v for k, v in equality.items() if v != 0})
+    return _empty(P, proof, f"{answer.reason}, where rows {fixed} hold with equality")
 
 
 def _decide_exactly(P: HasRows, program: Program) -> Emptiness:
-    outcome = exact_feasibility(P.A, P.b, program.flat, program.interior.point)
+    outcome = program.exact.feasible(program.interior.point)
     if outcome.status == "reached":
         return Emptiness("nonempty", to_floats(outcome.point), None, "a point found in rational arithmetic")
     if outcome.status == "optimal":
@@ -93,6 +153,6 @@ def _empty(P: HasRows, certificate: Certificate, reason: str) -> Emptiness:
 
 def _too_close(P: HasRows, radius: float) -> str:
     return (
-        f"largest ball of radius {radius:.2g} is too small for floats to decide, and {P.A.shape[0]} rows in "
-        f"{P.A.shape[1]} variables are too many for rational arithmetic"
+        f"largest ball of radius {radius:.2g}, in even units, is too small for floats to decide, and {P.A.shape[0]} "
+        f"rows in {P.A.shape[1]} variables are too many for rational arithmetic"
     )

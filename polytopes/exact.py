@@ -1,8 +1,6 @@
-"""Exact rational arithmetic on floats, and the one check that every proof of emptiness comes down to.
+"""Exact rational arithmetic on floats, and the check that proofs of emptiness come down to.
 
 Every finite float is a rational number, so a linear combination of rows of floats can be formed without any rounding.
-The functions take plain arrays and rational multipliers: a certificate of an `HPolytope` and the proof of an observer's
-window are checked by the same lines.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,6 +19,17 @@ _CANCELLING = 1e-3  # of the terms of a sum: below, its rounding errors would co
 def rational(value: float) -> fmpq:
     """The rational number that the float is."""
     return fmpq(*float(value).as_integer_ratio())
+
+
+def power_of_two(exponent: int) -> fmpq:
+    """``2^exponent``."""
+    return fmpq(1 << exponent) if exponent >= 0 else fmpq(1, 1 << -exponent)
+
+
+def rounded_up(value: fmpq) -> float:
+    """The smallest float that is at least `value`."""
+    number = int(value.p) / int(value.q)
+    return number if rational(number) >= value else float(np.nextafter(number, np.inf))
 
 
 def rational_vector(values: NDArray[np.float64]) -> list[fmpq]:
@@ -80,24 +89,6 @@ def combine(rows: NDArray[np.float64], rhs: NDArray[np.float64], multipliers: Mu
     return coefficients, constant
 
 
-def least_over_box(
-    coefficients: Sequence[fmpq], lower: NDArray[np.float64], upper: NDArray[np.float64]
-) -> fmpq | None:
-    """Exact minimum of a linear form over a box; None if it is unbounded below.
-
-    Infinite bounds are allowed where the coefficient is exactly zero.
-    """
-    total = ZERO
-    for j, coefficient in enumerate(coefficients):
-        if coefficient == 0:
-            continue
-        bound = lower[j] if coefficient > 0 else upper[j]
-        if not np.isfinite(bound):
-            return None
-        total += coefficient * rational(bound)
-    return total
-
-
 def refutes(
     A: NDArray[np.float64],
     b: NDArray[np.float64],
@@ -105,20 +96,16 @@ def refutes(
     d: NDArray[np.float64],
     inequality: Multipliers,
     equality: Multipliers,
-    box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> bool:
-    """Whether the multipliers prove that no x (in the box, if given) has ``A x <= b`` and ``C x = d`` (Farkas' lemma).
+    """Whether the multipliers prove that no x has ``A x <= b`` and ``C x = d`` (Farkas' lemma).
 
-    With ``g = lambda'A + mu'C`` and ``lambda >= 0``, the proof holds if the minimum of ``g'x`` over the box exceeds
-    ``lambda'b + mu'd``; without a box, g must be exactly zero.  Nothing is rounded.
+    They do if ``lambda >= 0``, ``lambda'A + mu'C = 0`` and ``lambda'b + mu'd < 0``.  Nothing is rounded.
 
     Parameters
     ----------
     A, b, C, d : arrays (m, n), (m,), (q, n), (q,)
     inequality, equality : dicts of row index to rational
         Multipliers lambda on the rows of A and mu on the rows of C.
-    box : pair of arrays (n,), optional
-        Bounds of the variables; may be infinite.
     """
     if not (_indices_fit(inequality, A) and _indices_fit(equality, C)):
         return False
@@ -126,11 +113,7 @@ def refutes(
         return False
     form, bound = combine(A, b, inequality)
     fixed, value = combine(C, d, equality)
-    form = [u + v for u, v in zip(form, fixed, strict=True)]
-    if box is None:
-        return all(v == 0 for v in form) and bound + value < 0
-    least = least_over_box(form, *box)
-    return least is not None and least > bound + value
+    return all(u + v == 0 for u, v in zip(form, fixed, strict=True)) and bound + value < 0
 
 
 def _indices_fit(multipliers: Multipliers, rows: NDArray[np.float64]) -> bool:

@@ -12,7 +12,7 @@ from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
 from polytopes.affine import AffineSet
-from polytopes.exact import ZERO, rational_matrix, rational_vector, to_floats
+from polytopes.exact import ZERO, rational_matrix, rational_vector
 
 Floats = NDArray[np.float64]
 _MAX_VARIABLES = 40  # above, a rational basis costs too much
@@ -39,9 +39,7 @@ def affordable(rows: int, variables: int) -> bool:
     return variables <= _MAX_VARIABLES and rows * variables <= _MAX_ENTRIES
 
 
-def exact_feasibility(
-    A: Floats, b: Floats, flat: AffineSet, guess: Floats, strictly: bool = False
-) -> ExactOutcome:
+def exact_feasibility(A: Floats, b: Floats, flat: AffineSet, guess: Floats, strictly: bool = False) -> ExactOutcome:
     """Maximise r in ``A x + r <= b`` over the affine set, until r >= 0 (until r > 0 if `strictly`).
 
     Parameters
@@ -156,11 +154,3 @@ def _block(rate: fmpq_mat, slack: fmpq_mat, slots: list[int | None]) -> tuple[in
 
 def _column(x: fmpq_mat) -> list[fmpq]:
     return [x[j, 0] for j in range(x.nrows())]
-
-
-def rounded(outcome: ExactOutcome, rows: int) -> tuple[float, Floats, Floats]:
-    """Value, point and multipliers (over all rows) of an optimum, rounded to floats."""
-    multipliers = np.zeros(rows)
-    for i, weight in outcome.multipliers.items():
-        multipliers[i] = to_floats([weight])[0]
-    return float(to_floats([outcome.value])[0]), to_floats(outcome.point), multipliers

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.exact import substituted
-from polytopes.linear_program import OPTIMAL, prepare
+from polytopes.linear_program import OPTIMAL, prepare_as_given
 
 Floats = NDArray[np.float64]
 Oracle = Callable[[Floats], Floats]  # directions (k, n) -> a maximiser for each, (k, n)
@@ -96,7 +96,7 @@ def unit_body(A: Floats, b: Floats, inner: Floats) -> UnitBody | None:
 def _measured(rows: Floats, rhs: Floats) -> tuple[Floats, Floats, float] | None:
     """A centre of the set, axes of unit width and the radius of a largest ball over the distance of the far points."""
     n = rows.shape[1]
-    program = prepare(rows, rhs, np.empty((0, n)), np.empty(0))
+    program = prepare_as_given(rows, rhs)
     axes = np.eye(n)
     extremes = program.maximise(np.vstack([axes, -axes]))
     if any(name != OPTIMAL for name in extremes.status):

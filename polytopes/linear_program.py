@@ -1,10 +1,11 @@
 """Linear programs over one set of rows: prepared once, solved by the kernel, by HiGHS, or in rationals.
 
 `Program` holds ``{x : A x <= b, C x = d}`` ready for solving: equalities eliminated (exactly), constant rows set aside,
-rows scaled by powers of two.  Small programs go to the compiled kernel, large ones to HiGHS.  Where the kernel gives no
+rows and coordinates in even units, which are powers of two.  Solvers see only numbers in these units, so that no unit
+of the user changes an answer.  Small programs go to the compiled kernel, large ones to HiGHS.  Where floats give no
 clean answer (an iteration limit, a ray or a pivot near rounding), the rational simplex decides if the program is small
-enough, else HiGHS, whose optimum must satisfy the optimality conditions.  What none of them settles is reported as
-undecided, never guessed.
+enough, else HiGHS.  Every maximum comes as an upper bound of the exact one, by weak duality with a bound of what was
+rounded; what none of them settles is reported as undecided, never guessed.
 """
 
 import logging
@@ -13,11 +14,14 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
+from flint import fmpq
 from numpy.typing import NDArray
 
 from polytopes import kernel
 from polytopes.affine import AffineSet, affine_set
-from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum, rounded
+from polytopes.duality import Bounds, multiplier_bounds, proved_reach
+from polytopes.exact import rounded_up, to_floats
+from polytopes.exact_units import EvenRows, weights_of
 from polytopes.highs import HighsProgram
 
 Floats = NDArray[np.float64]
@@ -25,12 +29,14 @@ Indices = NDArray[np.int64]
 
 _KERNEL_VARIABLES = 40
 _KERNEL_ENTRIES = 200_000
-_CLEAN = 1e-9  # relative violation of the optimality conditions that is still accepted from HiGHS
+_EPS = float(np.finfo(np.float64).eps)
+_CLEAN = 1e-9  # relative gap between a maximum and its bound that is still accepted from floats
+_SHARP = 1e-6  # the same gap, of the radius of a largest ball
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
 _SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
 _NOISE = 1e-15  # width, relative to the coordinates, that may be rounding
-_SQUARABLE = 1e100  # norms of rows up to here, and down to its reciprocal, may be squared
 _FARTHEST = 1e150  # distance of a hyperplane from the origin; the squares of coordinates beyond are no floats
+_EVEN_POWERS = 2  # exponents of two by which the units of the axes may differ from even ones
 _UNEVEN = 256.0  # ratio of the widths along two axes from which the axes are scaled
 
 _ANNOUNCE_AFTER = 1.5  # seconds; loading the kernels from the cache takes less
@@ -55,6 +61,8 @@ def warm_up() -> None:
         kernel.interior(AT, b, norms, np.zeros(1), 1.0)
         kernel.supports(AT, b, np.zeros(1), np.ones((1, 1)))
         kernel.irredundant(AT, b, np.zeros(1))
+        kernel.scaled(np.ones((1, 1)), np.ones(1))
+        kernel.exponents(np.ones((1, 1)), np.ones(1))
         table, names = np.array([[1.0, 1.0, 1.0], [-1.0, 0.0, 1.0], [0.0, -1.0, 1.0]]), np.arange(2)
         kernel.eliminate(table, np.zeros(3, np.int64), names, names[:1], np.zeros(2), 10, False)
     finally:
@@ -63,13 +71,23 @@ def warm_up() -> None:
 
 @dataclass(frozen=True, eq=False)
 class Interior:
-    """Centre of a largest ball (n,), its radius, and multipliers (m,) that prove the radius.
+    """A largest ball in the even units of a program.
 
-    `radius` is negative if the rows have no common point, and inf where the ball can grow without end.  `reliable` is
-    False if no solver finished.
+    Attributes
+    ----------
+    point, centre : arrays (n,) and (free,)
+        The centre, in the coordinates of the user and in those of the program.
+    radius : float
+        In the units of the program, among its free coordinates: negative if the rows have no common point, and inf
+        where the ball can grow without end.
+    multipliers : array (kept,)
+        Of the scaled rows; they prove the radius.
+    reliable : bool
+        False if no solver finished.
     """
 
     point: Floats
+    centre: Floats
     radius: float
     multipliers: Floats
     reliable: bool
@@ -77,11 +95,24 @@ class Interior:
 
 @dataclass(frozen=True, eq=False)
 class Maxima:
-    """Maxima of k linear forms: values (k,), points (k, n), multipliers of the rows (k, m), status (k,) of names."""
+    """Maxima of k linear forms: values (k,), points (k, n), multipliers of the rows (k, m), status (k,) of names.
+
+    The values are upper bounds of the exact maxima, and about as near as floats are.
+    """
 
     values: Floats
     points: Floats
     multipliers: Floats
+    status: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """What a solver says of k forms, in the units of a program."""
+
+    points: Floats
+    weights: Floats
+    bounds: Bounds
     status: list[str]
 
 
@@ -91,14 +122,12 @@ class Program:
 
     Attributes
     ----------
-    AT, rhs : arrays (free, kept) and (kept,)
-        Rows in the free coordinates z, scaled and transposed.
-    norms : array (kept,)
-        Norms of the scaled rows in the metric of x, within the affine set.
-    scale : array (kept,)
-        The powers of two.
-    columns : array (free,)
-        Powers of two: the coordinates of AT are the free coordinates divided by them.
+    exact : EvenRows
+        All rows, for the rational simplex.
+    AT, rhs, norms : arrays (free, kept), (kept,) and (kept,)
+        Rows in the free coordinates, in even units, transposed, and their norms, in [1/2, 1).
+    row_powers, powers : arrays (kept,) and (free,) of int
+        Exponents of two: of row i of the user ``2^row_powers[i]`` times as much, in coordinates ``x_j / 2^powers[j]``.
     kept : array of int
         The rows that are not constant on the affine set.
     violated : int or None
@@ -108,13 +137,24 @@ class Program:
     A: Floats
     b: Floats
     flat: AffineSet
+    exact: EvenRows
     AT: Floats
     rhs: Floats
     norms: Floats
-    scale: Floats
-    columns: Floats
+    row_powers: Indices
+    powers: Indices
     kept: Indices
     violated: int | None
+
+    @property
+    def scale(self) -> Floats:
+        """The powers of two of the kept rows (kept,)."""
+        return np.ldexp(1.0, self.row_powers)
+
+    @property
+    def columns(self) -> Floats:
+        """The powers of two of the free coordinates (free,): ``x_j = columns[j] z_j``."""
+        return np.ldexp(1.0, self.powers)
 
     @property
     def consistent(self) -> bool:
@@ -123,15 +163,8 @@ class Program:
 
     @cached_property
     def size(self) -> float:
-        """The size that tolerances refer to: the largest entry of the scaled b, or 1; ValueError beyond 1e150."""
-        size = float(np.abs(self.rhs).max(initial=0.0)) or 1.0
-        if size > _FARTHEST:
-            far = int(self.kept[np.abs(self.rhs).argmax()])
-            raise ValueError(
-                f"row {far} of A bounds {self.A[far].tolist()} x by {self.b[far]:.3g}, some {size:.1g} from the "
-                f"origin; expected at most {_FARTHEST:g}. Use other units, or leave out a row that is not to bound."
-            )
-        return size
+        """The size that tolerances refer to: the largest entry of the scaled b, or 1."""
+        return float(np.abs(self.rhs).max(initial=0.0)) or 1.0
 
     @cached_property
     def _small(self) -> bool:
@@ -141,20 +174,24 @@ class Program:
     def _highs(self) -> HighsProgram:
         return HighsProgram(np.ascontiguousarray(self.AT.T), self.rhs)
 
+    def lift(self, z: Floats) -> Floats:
+        """Points (..., free) in the units of the program as points (..., n) of the user."""
+        return self.flat.lift(np.ldexp(z, self.powers))
+
     @cached_property
     def interior(self) -> Interior:
         """Centre and radius of a largest ball within the affine set; the program must be consistent."""
         free, kept = self.AT.shape
         if kept == 0:
-            return Interior(self.flat.lift(np.zeros(free)), np.inf, np.zeros(self.b.size), True)
+            origin = np.zeros(free)
+            return Interior(self.lift(origin), origin, np.inf, np.zeros(0), True)
         # By duality a largest ball has a radius of at most max |b_i| / |a_i|, or none at all.
         cap = 2.0 * self.size / float(self.norms.min())
         if self._small:
             warm_up()
             z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), cap)
             if status == kernel.OPTIMAL:
-                proof = self._unscaled(weights)
-                return Interior(self.flat.lift(z * self.columns), _uncapped(radius, cap), proof, True)
+                return Interior(self.lift(z), z, _uncapped(radius, cap), weights, True)
         return self._interior_by_highs(cap)
 
     def _interior_by_highs(self, cap: float) -> Interior:
@@ -163,8 +200,9 @@ class Program:
         answer = HighsProgram(rows, np.append(self.rhs, cap)).maximise(np.append(np.zeros(free), 1.0))
         point = answer.point if answer.point.size == free + 1 else np.zeros(free + 1)
         weights = answer.multipliers[:kept] if answer.multipliers.size == kept + 1 else np.zeros(kept)
-        proof, centre = self._unscaled(np.maximum(weights, 0.0)), self.flat.lift(point[:-1] * self.columns)
-        return Interior(centre, _uncapped(point[-1], cap), proof, answer.status == "optimal")
+        radius = _uncapped(point[-1], cap)
+        z = point[:-1].copy()
+        return Interior(self.lift(z), z, radius, np.maximum(weights, 0.0), answer.status == "optimal")
 
     @cached_property
     def thin(self) -> bool:
@@ -177,11 +215,10 @@ class Program:
         """Whether a ball fits in, within the affine set, that floats vouch for."""
         return self.consistent and not self.thin and self.interior.radius > 0.0
 
-    @cached_property
+    @property
     def centre(self) -> Floats:
         """The centre of a largest ball in the coordinates of AT."""
-        point: Floats = self.interior.point[self.flat.free] / self.columns
-        return point
+        return self.interior.centre
 
     @cached_property
     def balanced(self) -> "Program":
@@ -189,39 +226,60 @@ class Program:
 
         The program itself if it may be as it is.  Its largest ball, if it has been scaled, is one of the scaled set.
         """
-        free = self.AT.shape[0]
-        if free < 2 or not self.consistent or not self._small or self.interior.radius > _SMALL_BALL * self.size:
+        if self.AT.shape[0] < 2 or not self.consistent or not self._small:
             return self
-        program = self
+        if self.interior.radius > _SMALL_BALL * self.size:
+            return self
+        program = self._evened()
         for _ in range(3):
             widths = program._widths()
             if widths.max() <= _UNEVEN * widths.min():
                 break
-            program = program._scaled(np.ldexp(1.0, np.frexp(widths)[1]))
+            program = program._scaled(np.frexp(widths)[1])
+        return program
+
+    def _evened(self) -> "Program":
+        """The program in units in which the nearest rows along the axes, seen from the centre, are about as far.
+
+        Exponents of entries alone do not tell small coefficients that matter from those that do not; the slacks do.
+        """
+        program = self
+        for _ in range(3):
+            radius = program.interior.radius
+            if not program.interior.reliable or not _THIN * program.size < radius < np.inf:
+                break
+            slack = program.rhs - program.centre @ program.AT
+            steepest = (np.abs(program.AT) / np.maximum(slack, radius / 2.0)).max(axis=1)
+            powers = -np.frexp(steepest)[1]
+            if np.ptp(powers) <= _EVEN_POWERS or not steepest.all():
+                break
+            program = program._scaled(powers)
         return program
 
     def _widths(self) -> Floats:
         """Widths (free,) along the axes of AT: an infinite one by the steepest entry, a hidden one the largest."""
-        axes = np.eye(len(self.columns))
-        points, _, status = self._solve(np.vstack([axes, -axes]))
-        solved = np.array([name == OPTIMAL for name in status])
-        upper, lower = np.split(np.where(solved[:, None], points, np.nan), 2)
+        axes = np.eye(self.powers.size)
+        found = self._solve(np.vstack([axes, -axes]))
+        solved = np.array([name == OPTIMAL for name in found.status])
+        upper, lower = np.split(np.where(solved[:, None], found.points, np.nan), 2)
         widths = np.diag(upper) - np.diag(lower)
         rest = self.rhs - self.centre @ self.AT
         open_ = rest > _NOISE * self.size  # a row that holds with equality says nothing about a width
         steepest = (np.abs(self.AT[:, open_]) / rest[open_]).max(axis=1, initial=0.0)
         widths = np.where(np.isnan(widths) & (steepest > 0.0), 1.0 / np.maximum(steepest, 1e-30), widths)
-        size = np.abs(np.where(solved[:, None], points, 0.0)).max(axis=0, initial=float(np.abs(self.centre).max()))
-        known = widths > _NOISE * size
+        reach = np.abs(np.where(solved[:, None], found.points, 0.0)).max(
+            axis=0, initial=float(np.abs(self.centre).max())
+        )
+        known = widths > _NOISE * reach
         return np.where(known, widths, widths[known].max() if known.any() else 1.0)
 
-    def _scaled(self, factors: Floats) -> "Program":
-        AT = self.AT * factors[:, None]
-        change = np.ldexp(1.0, -np.frexp(np.linalg.norm(AT, axis=0))[1])
-        AT = AT * change
+    def _scaled(self, factors: Indices) -> "Program":
+        AT = np.ldexp(self.AT, factors[:, None])
+        change = -np.frexp(np.linalg.norm(AT, axis=0))[1]
+        AT = np.ascontiguousarray(np.ldexp(AT, change))
         return replace(
-            self, AT=AT, rhs=self.rhs * change, norms=np.linalg.norm(AT, axis=0), scale=self.scale * change,
-            columns=self.columns * factors,
+            self, AT=AT, rhs=np.ldexp(self.rhs, change), norms=np.linalg.norm(AT, axis=0),
+            row_powers=self.row_powers + change, powers=self.powers + factors,
         )  # fmt: skip
 
     def maximise(self, directions: Floats) -> Maxima:
@@ -233,113 +291,255 @@ class Program:
         """
         program = self.balanced
         k = directions.shape[0]
-        reduced = np.ascontiguousarray(self.flat.restrict(directions, np.zeros(k))[0] * program.columns)
-        points, weights, status = program._solve(reduced)
-        lifted, multipliers = self.flat.lift(points * program.columns), np.zeros((k, self.b.size))
-        multipliers[:, self.kept] = weights * program.scale
-        solved = np.array([name == OPTIMAL for name in status], dtype=bool)
-        values = np.where(solved, (directions * lifted).sum(axis=1), np.inf)
-        for q in np.flatnonzero(~solved).tolist():
-            if status[q] == UNDECIDED or self.thin:  # of a thin set, floats take an edge for a ray
-                status[q], values[q], lifted[q], multipliers[q] = program._maximise_carefully(directions[q], reduced[q])
-        return Maxima(values, lifted, multipliers, status)
+        reduced, tops, constants = program._scaled_forms(directions)
+        found = program._solve(reduced)
+        values = np.ldexp(program._proved(directions, reduced, tops, found), tops)
+        values = program._with_constants(directions, values, constants)
+        lifted, multipliers = program.lift(found.points), np.zeros((k, self.b.size))
+        multipliers[:, self.kept] = np.ldexp(found.weights, program.row_powers + tops[:, None])
+        for q, name in enumerate(found.status):
+            if name == UNBOUNDED and not self.thin:  # of a thin set, floats take an edge for a ray
+                values[q] = np.inf
+            elif name != OPTIMAL:
+                guess = lifted[q], multipliers[q]
+                answer = program._by_exact_multipliers(directions[q], *guess) or program._maximise_carefully(
+                    directions[q], reduced[q], tops[q]
+                )
+                found.status[q], values[q], lifted[q], multipliers[q] = answer
+        return Maxima(values, lifted, multipliers, found.status)
 
-    def _solve(self, reduced: Floats) -> tuple[Floats, Floats, list[str]]:
-        """Points (k, free) and multipliers (k, kept) in the coordinates of AT by the kernel, and the status of each."""
+    def estimate(self, directions: Floats) -> Floats:
+        """The maxima as floats see them (k,): forms that rounding may have turned a little are not unbounded for it.
+
+        For questions with a tolerance; nothing is proved.
+        """
+        program = self.balanced
+        reduced, tops, constants = program._scaled_forms(directions)
+        found = program._solve(reduced)
+        values = np.ldexp((reduced * found.points).sum(axis=1), tops) - constants
+        solved = np.array([name == OPTIMAL for name in found.status], dtype=bool)
+        values[~solved] = self.maximise(directions[~solved]).values
+        return values
+
+    def _scaled_forms(self, directions: Floats) -> tuple[Floats, Indices, Floats]:
+        """Forms (k, free) in the coordinates of the program, their largest entries about one, what they were divided by
+        (exponents of two), and their values on the affine set at the origin of its coordinates, negative."""
+        rows, constants = self.flat.restrict(directions, np.zeros(len(directions)))
+        reduced = np.ldexp(rows, self.powers)
+        tops = np.frexp(np.abs(reduced).max(axis=1, initial=0.0))[1]
+        return np.ldexp(reduced, -tops[:, None]), tops, constants
+
+    def _proved(self, directions: Floats, reduced: Floats, tops: Indices, found: _Solved) -> Floats:
+        """Upper bounds (k,) of the scaled forms; a form whose bound is not near its maximum becomes undecided."""
+        bounds = found.bounds
+        if self.flat.pivots:
+            of_rows, of_rhs = self.errors
+            of_forms = self.flat.restriction_errors(directions, np.zeros(len(directions)))[0]
+            beside = np.ldexp(np.ldexp(of_forms, self.powers), -tops[:, None])
+            bounds = bounds.widened(found.weights @ of_rhs, beside + found.weights @ of_rows)
+        values = bounds.over(self._reach) if bounds.beside.any() else bounds.values
+        gap = values - (reduced * found.points).sum(axis=1)
+        terms = (np.abs(reduced) * np.abs(found.points)).sum(axis=1) + np.abs(values)
+        room = np.minimum(_CLEAN * terms, _SHARP * max(self.interior.radius, 0.0) + 8.0 * _EPS * terms)
+        near = (gap <= room) & np.isfinite(values)
+        for q in np.flatnonzero(~near):
+            if found.status[q] == OPTIMAL:
+                found.status[q] = UNDECIDED
+        return values
+
+    @cached_property
+    def errors(self) -> tuple[Floats, Floats]:
+        """What the elimination of equalities rounded: bounds (kept, free) and (kept,) for the entries of AT and rhs."""
+        of_rows, of_rhs = self.flat.restriction_errors(self.A[self.kept], self.b[self.kept])
+        return np.ldexp(of_rows, self.row_powers[:, None] + self.powers), np.ldexp(of_rhs, self.row_powers)
+
+    @cached_property
+    def _reach(self) -> Floats:
+        """Bounds (free,) of the coordinates of all points of the set; inf where none is proved."""
+        bounds = self._along_axes.bounds
+        if self.flat.pivots:
+            of_rows, of_rhs = self.errors
+            weights = self._along_axes.weights
+            bounds = bounds.widened(weights @ of_rhs, weights @ of_rows)
+        solved = np.array([name == OPTIMAL for name in self._along_axes.status])
+        values = np.where(solved, 2.0 * bounds.values, np.inf)
+        return proved_reach(Bounds(values, bounds.spare, 2.0 * bounds.beside))
+
+    @cached_property
+    def _axes(self) -> Floats:
+        half = 0.5 * np.eye(self.powers.size)  # as forms are scaled
+        return np.vstack([half, -half])
+
+    @cached_property
+    def _along_axes(self) -> _Solved:
+        if self._small:
+            return self._by_kernel(self._axes)
+        answers = [self._by_highs(axis) for axis in self._axes]
+        points, weights, bounds, status = zip(*answers, strict=True)
+        values, spare = (np.concatenate(part) for part in zip(*((b.values, b.spare) for b in bounds), strict=True))
+        all_bounds = Bounds(values, spare, np.vstack([b.beside for b in bounds]))
+        return _Solved(np.array(points), np.array(weights), all_bounds, list(status))
+
+    def _solve(self, reduced: Floats) -> _Solved:
+        """The forms (k, free), scaled, by the kernel where the program is small."""
         k, free = reduced.shape
-        points, weights = np.zeros((k, free)), np.zeros((k, self.kept.size))
         if free and self._small:
-            return points, weights, self._maximise_by_kernel(reduced, points, weights)
-        return points, weights, [OPTIMAL if free == 0 else UNDECIDED] * k
-
-    def _maximise_by_kernel(self, reduced: Floats, points: Floats, weights: Floats) -> list[str]:
-        warm_up()
-        points[:], active, y, status = kernel.supports(self.AT, self.rhs, self.centre, reduced)
-        row, slot = np.nonzero(active >= 0)
-        weights[row, active[row, slot]] = y[row, slot]
-        return [_NAMES.get(code, UNDECIDED) for code in status.tolist()]
-
-    def _maximise_carefully(self, direction: Floats, reduced: Floats) -> tuple[str, float, Floats, Floats]:
-        """The rational simplex if it is affordable, else HiGHS, accepted if the optimality conditions hold."""
-        nowhere, nothing = np.full(self.flat.dim, np.nan), np.zeros(self.b.size)
-        if affordable(*self.A.shape):
-            start = exact_feasibility(self.A, self.b, self.flat, self.interior.point)
-            if start.status == "reached":
-                outcome = exact_maximum(self.A, self.b, self.flat, direction, start.point)
-                if outcome.status == "optimal":
-                    return OPTIMAL, *rounded(outcome, self.b.size)
-                if outcome.status == "unbounded":
-                    return UNBOUNDED, np.inf, nowhere, nothing
-        answer = self._highs.maximise(reduced)
-        if answer.status == "optimal" and self._optimal(reduced, answer.point, answer.multipliers):
-            point = self.flat.lift(answer.point * self.columns)
-            return OPTIMAL, float(direction @ point), point, self._unscaled(answer.multipliers)
-        if answer.status == "unbounded":
-            return UNBOUNDED, np.inf, nowhere, nothing
-        return UNDECIDED, np.nan, nowhere, nothing
-
-    def _optimal(self, c: Floats, z: Floats, y: Floats) -> bool:
-        """Primal and dual feasibility and equal objectives, to a relative 1e-9."""
-        reach = max(self.size, float(np.abs(z).max(initial=0.0)))
-        size = float(np.abs(c).max(initial=0.0)) or 1.0
-        return bool(
-            (self.AT.T @ z - self.rhs).max(initial=0.0) <= _CLEAN * reach
-            and y.min(initial=0.0) >= -_CLEAN * size
-            and np.abs(self.AT @ y - c).max(initial=0.0) <= _CLEAN * size
-            and abs(c @ z - y @ self.rhs) <= _CLEAN * size * reach
+            if k == 2 * free and np.array_equal(reduced, self._axes):
+                along = self._along_axes
+                return replace(along, status=list(along.status))
+            return self._by_kernel(reduced)
+        nothing = Bounds(np.zeros(k), np.zeros(k), np.zeros((k, free)))
+        return _Solved(
+            np.zeros((k, free)), np.zeros((k, self.kept.size)), nothing, [UNDECIDED if free else OPTIMAL] * k
         )
 
-    def _unscaled(self, weights: Floats) -> Floats:
-        """Multipliers of the scaled, kept rows as multipliers of the rows of A."""
+    def _by_kernel(self, reduced: Floats) -> _Solved:
+        warm_up()
+        points, active, y, values, spare, beside, status = kernel.supports(self.AT, self.rhs, self.centre, reduced)
+        weights = np.zeros((len(reduced), self.kept.size))
+        row, slot = np.nonzero(active >= 0)
+        weights[row, active[row, slot]] = y[row, slot]
+        names = [_NAMES.get(code, UNDECIDED) for code in status.tolist()]
+        return _Solved(points, weights, Bounds(values, spare, beside), names)
+
+    def _by_highs(self, reduced: Floats) -> tuple[Floats, Floats, Bounds, str]:
+        """Point, multipliers, bounds and status of one form by HiGHS, its multipliers refined on the rows they use."""
+        free, kept = self.AT.shape
+        answer = self._highs.maximise(reduced)
+        if answer.status != OPTIMAL:
+            status = UNBOUNDED if answer.status == "unbounded" else UNDECIDED
+            return np.zeros(free), np.zeros(kept), Bounds(np.full(1, np.inf), np.zeros(1), np.zeros((1, free))), status
+        y = np.maximum(answer.multipliers, 0.0)
+        used = np.flatnonzero(y > _CLEAN * y.max(initial=0.0))
+        refined = np.zeros(kept)
+        refined[used] = np.maximum(
+            y[used] + _least_squares(self.AT[:, used], reduced - self.AT[:, used] @ y[used]), 0.0
+        )
+        return answer.point, refined, multiplier_bounds(self.AT, self.rhs, reduced, refined), OPTIMAL
+
+    @cached_property
+    def _exact_point(self) -> list[fmpq] | None:
+        """A point that satisfies every row exactly; None if the rational simplex is not affordable or did not end."""
+        if not self.exact.affordable:
+            return None
+        start = self.exact.feasible(self.interior.point)
+        return start.point if start.status == "reached" else None
+
+    def _by_exact_multipliers(
+        self, direction: Floats, point: Floats, weights: Floats
+    ) -> tuple[str, float, Floats, Floats] | None:
+        """The exact bound by the rows that float multipliers use, if it is near the value at the point."""
+        if not weights.any():
+            return None
+        bound = self.exact.bound(direction, weights)
+        if bound is None:
+            return None
+        value, gap = rounded_up(bound[0]), float(to_floats([bound[0]])[0] - direction @ point)
+        if not gap <= _CLEAN * (float(np.abs(direction) @ np.abs(point)) + abs(value)):
+            return None
+        return OPTIMAL, value, point, weights
+
+    def _maximise_carefully(self, direction: Floats, reduced: Floats, top: int) -> tuple[str, float, Floats, Floats]:
+        """The rational simplex if it is affordable, else HiGHS, accepted if the bound is near the maximum."""
+        nowhere, nothing = np.full(self.flat.dim, np.nan), np.zeros(self.b.size)
+        start = self._exact_point
+        if start is not None:
+            outcome = self.exact.maximum(direction, start)
+            if outcome.status == "optimal":
+                point, weights = to_floats(outcome.point), weights_of(outcome, self.b.size)
+                return OPTIMAL, rounded_up(outcome.value), point, weights
+            if outcome.status == "unbounded":
+                return UNBOUNDED, np.inf, nowhere, nothing
+        z, y, bounds, status = self._by_highs(reduced)
+        if status == UNBOUNDED:
+            return UNBOUNDED, np.inf, nowhere, nothing
+        found = _Solved(z[None], y[None], bounds, [status])
+        value = float(self._proved(direction[None], reduced[None], np.array([top]), found)[0])
+        if found.status[0] != OPTIMAL:
+            return UNDECIDED, np.nan, nowhere, nothing
+        constants = self.flat.restrict(direction[None], np.zeros(1))[1]
+        value = float(self._with_constants(direction[None], np.ldexp([value], top), constants)[0])
         multipliers = np.zeros(self.b.size)
-        multipliers[self.kept] = weights * self.scale
-        return multipliers
+        multipliers[self.kept] = np.ldexp(y, self.row_powers + top)
+        return OPTIMAL, value, self.lift(z), multipliers
+
+    def _with_constants(self, directions: Floats, values: Floats, constants: Floats) -> Floats:
+        """The bounds of ``c'x = values - constants``, rounded up unless no sum is rounded."""
+        if not self.flat.pivots:
+            return values
+        error = self.flat.restriction_errors(directions, np.zeros(len(directions)))[1]
+        known = np.where(np.isfinite(values), values, 0.0)
+        total = known - constants
+        part = total - known
+        lost = (known - (total - part)) - (constants + part)
+        more = error + np.maximum(lost, 0.0)
+        total = np.where(more > 0.0, np.nextafter(total + more, np.inf), total)
+        return np.where(np.isfinite(values), total, values)
 
 
 def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
-    """Eliminate the equalities, set constant rows aside and scale the others.
+    """Eliminate the equalities, set constant rows aside and put the others into even units.
 
     Parameters
     ----------
     A, b, C, d : arrays (m, n), (m,), (q, n), (q,)
+
+    Raises
+    ------
+    ValueError
+        If a hyperplane is too far from the origin, or units that even out the rows leave numbers that are no floats.
     """
-    flat = affine_set(C, d)
+    units = None
+    if d.size:
+        row_units, units = kernel.exponents(np.vstack([A, C]), np.append(b, d))
+    flat = affine_set(C, d, units=units)
     rows, rhs = flat.restrict(A, b)
-    norms, kept, violated, factors = _norms(rows), np.arange(b.size), None, None
-    if np.count_nonzero((norms > 1.0 / _SQUARABLE) & (norms < _SQUARABLE)) < b.size:
-        rows, rhs, factors = _squarable(rows, rhs)
-        norms = _norms(rows)
-        failing = np.flatnonzero((norms == 0.0) & (rhs < 0.0))
-        violated = int(failing[0]) if failing.size else None
-        kept = np.flatnonzero(norms)
-        rows, rhs, norms, factors = rows[kept], rhs[kept], norms[kept], factors[kept]
-    scale = np.ldexp(1.0, -np.frexp(norms)[1])
-    AT = np.ascontiguousarray(rows.T) * scale
-    lengths = norms * scale if not flat.pivots else _metric_norms(AT.T, flat)
-    total = scale if factors is None else scale * factors
-    return Program(A, b, flat, AT, rhs * scale, lengths, total, np.ones(len(flat.free)), kept, violated)
+    AT, even, norms, row_powers, powers, kept, far, lost = kernel.scaled(rows.copy(), rhs.copy())
+    _refuse_extremes(A, b, far, lost)
+    violated = None
+    if kept.size < b.size:
+        constant = np.setdiff1d(np.arange(b.size), kept)
+        violated = next((int(i) for i in constant if rhs[i] < 0.0), None)
+    if units is None:
+        units, row_units = powers, -np.frexp(b)[1].astype(np.int64)
+        row_units[kept] = row_powers
+    exact = EvenRows(A, b, flat, row_units[: b.size], units)
+    return Program(A, b, flat, exact, AT, even, norms, row_powers, powers, kept, violated)
 
 
-def _norms(rows: Floats) -> Floats:
-    norms: Floats = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    return norms
+def prepare_as_given(A: Floats, b: Floats) -> Program:
+    """Rows whose coordinates are good as they are; only the rows are scaled."""
+    flat = affine_set(np.empty((0, A.shape[1])), np.empty(0))
+    lengths = np.linalg.norm(A, axis=1)
+    kept = np.flatnonzero(lengths)
+    row_powers, powers = -np.frexp(lengths)[1].astype(np.int64), np.zeros(A.shape[1], np.int64)
+    AT, even = np.ldexp(A[kept], row_powers[kept, None]).T, np.ldexp(b[kept], row_powers[kept])
+    norms = np.ldexp(lengths[kept], row_powers[kept])
+    violated = next((int(i) for i in np.flatnonzero(lengths == 0.0) if b[i] < 0.0), None)
+    exact = EvenRows(A, b, flat, row_powers, powers)
+    return Program(A, b, flat, exact, np.ascontiguousarray(AT), even, norms, row_powers[kept], powers, kept, violated)
 
 
-def _squarable(rows: Floats, rhs: Floats) -> tuple[Floats, Floats, Floats]:
-    """Rows whose largest entry is about one, but rows of zeros as they are, and the powers of two that made them so."""
-    largest = np.abs(rows).max(axis=1, initial=0.0)
-    factors = np.ldexp(1.0, np.minimum(-np.frexp(np.where(largest > 0.0, largest, 0.5))[1], 1000))
-    with np.errstate(over="ignore"):  # a bound of infinity is refused later, where its row is known
-        return rows * factors[:, None], rhs * factors, factors
+def _refuse_extremes(A: Floats, b: Floats, far: int, lost: int) -> None:
+    if far >= 0:
+        raise ValueError(
+            f"row {far} of A bounds {A[far].tolist()} x by {b[far]:.3g}, more than {_FARTHEST:g} from the origin; "
+            f"expected at most {_FARTHEST:g}. Use other units, or leave out a row that is not to bound."
+        )
+    if lost >= 0:
+        raise ValueError(
+            f"row {lost} of A, {A[lost].tolist()}, has entries of so different sizes that no units make floats of them "
+            "all. Leave out entries that do not matter."
+        )
 
 
 def _uncapped(radius: float, cap: float) -> float:
     return float(radius) if radius < 0.99 * cap else np.inf
 
 
-def _metric_norms(rows: Floats, flat: AffineSet) -> Floats:
-    """Norms of the rows (in free coordinates) measured in x, along the affine set."""
-    if not flat.free:
-        return np.ones(len(rows))
-    gram = np.linalg.cholesky(flat.basis.T @ flat.basis)
-    return np.linalg.norm(np.linalg.solve(gram, rows.T), axis=0)
+def _least_squares(A: Floats, b: Floats) -> Floats:
+    """A least-squares solution, zero if it is not found."""
+    try:
+        return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])
+    except np.linalg.LinAlgError:
+        return np.zeros(A.shape[1])

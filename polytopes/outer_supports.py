@@ -96,7 +96,8 @@ def _by_duality(P: Rows, directions: Floats, uncertain: Floats) -> tuple[Floats,
         return np.full(len(directions), np.inf), np.zeros(len(directions), dtype=bool)
     bounds = constant[2 * n :] + (weights[2 * n :] + uncertain) @ most
     bounds += 4.0 * _EPS * np.abs(bounds)
-    room = _SHARP * P.program.interior.radius * np.linalg.norm(directions, axis=1)
+    forms = P.program.flat.restrict(directions, np.zeros(len(directions)))[0]
+    room = _SHARP * P.program.interior.radius * np.linalg.norm(np.ldexp(forms, P.program.powers), axis=1)
     sharp = bounds - best.values[2 * n :] <= room + 2.0 * uncertain @ most
     return bounds, sharp
 

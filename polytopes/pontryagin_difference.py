@@ -38,7 +38,7 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     near = None
     if not short and Q.wide:
         near = P.A, np.nextafter(P.b - lower_supports(Q, P.A), np.inf), P.C, P.d
-        if _clear(Rows(*near).program, P.program.size):
+        if _clear(Rows(*near).program, P.b):
             return near
     exact = exact_supports(Q, np.vstack([P.A, P.C, -P.C]))
     if exact is not None:
@@ -49,10 +49,11 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     return near
 
 
-def _clear(program: Program, size: float) -> bool:
-    """Whether rounding of right-hand sides that were differences of numbers of a size changes nothing of the set."""
+def _clear(program: Program, b: Floats) -> bool:
+    """Whether rounding of right-hand sides that were differences of numbers b (m,) changes nothing of the set."""
     nearest = abs(program.interior.radius) if program.consistent else 0.0
-    return nearest > _ROUNDED * max(program.size, size)
+    sizes = np.abs(b[program.kept]) * program.scale
+    return nearest > _ROUNDED * max(program.size, float(sizes.max(initial=0.0)))
 
 
 def _moved_exactly(P: Rows, supports: Sequence[Fraction], constant: Floats) -> Table:

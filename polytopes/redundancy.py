@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from polytopes import kernel
 from polytopes.affine_hull import explicit
 from polytopes.exact import rational, rational_matrix, rational_vector
-from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
+from polytopes.exact_simplex import affordable
 from polytopes.frame import unit_body
 from polytopes.linear_program import Program, prepare, warm_up
 from polytopes.rows import Rows
@@ -86,11 +86,11 @@ def _needed(A: Floats, b: Floats, row: Floats, rhs: float) -> bool:
     """Whether ``row'x <= rhs`` does not follow from the others, in rationals; True if that would take too long."""
     if not affordable(*A.shape):
         return True
-    flat = prepare(A, b, np.empty((0, row.size)), np.empty(0)).flat
-    start = exact_feasibility(np.vstack([A, row]), np.append(b, rhs), flat, np.zeros(row.size))
+    nothing = np.empty((0, row.size)), np.empty(0)
+    start = prepare(np.vstack([A, row]), np.append(b, rhs), *nothing).exact.feasible(np.zeros(row.size))
     if start.status != "reached":
         return True
-    best = exact_maximum(A, b, flat, row, start.point)
+    best = prepare(A, b, *nothing).exact.maximum(row, start.point)
     if best.status != "optimal":
         return True
     inner = sum((u * v for u, v in zip(rational_vector(row), start.point, strict=True)), rational(0.0))

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from polytopes.affine_hull import explicit
 from polytopes.errors import EmptySetError, UnboundedError
 from polytopes.frame import unit_frame
+from polytopes.linear_program import prepare_as_given
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
 
@@ -30,19 +31,18 @@ def random_points(P: Rows, count: int, rng: np.random.Generator) -> Floats:
         raise UnboundedError("P is unbounded: there is no uniform distribution on it; intersect it with a box first.")
     program = explicit(P).program
     free = program.flat.free
-    z = program.interior.point[free]
+    z = program.centre
     if not free:
         return np.tile(program.flat.point, (count, 1))
     rows = program.AT.T
-    body = Rows(rows, program.rhs).program
+    body = prepare_as_given(rows, program.rhs)
     frame = unit_frame(lambda directions: body.maximise(directions).points, z)
     walk = np.empty((count, len(free)))
     for k in range(count):
         for _ in range(_STEPS * len(free)):
             z = _step(rows, program.rhs, z, frame @ rng.standard_normal(len(free)), rng)
         walk[k] = z
-    points: Floats = program.flat.lift(walk)
-    return points
+    return program.lift(walk)
 
 
 def _step(rows: Floats, rhs: Floats, z: Floats, direction: Floats, rng: np.random.Generator) -> Floats:

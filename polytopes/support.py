@@ -140,9 +140,20 @@ def chebyshev(P: Rows) -> Ball:
     """
     if not known_nonempty(P):
         raise EmptySetError("the empty set has no largest ball; ask emptiness() first.")
-    if not P.program.flat.free:
-        return Ball(P.program.flat.point.copy(), 0.0)
-    interior = P.program.interior
-    if not interior.reliable:
-        raise UndecidedError("no solver found a largest ball.")
-    return Ball(interior.point.copy(), max(interior.radius, 0.0))
+    flat = P.program.flat
+    if not flat.free:
+        return Ball(flat.point.copy(), 0.0)
+    along = np.linalg.qr(flat.basis / np.linalg.norm(flat.basis, axis=0))[0] if flat.pivots else np.eye(P.dim)
+    norms = np.linalg.norm(P.A @ along, axis=1) * flat.restrict(P.A, P.b)[0].any(axis=1)
+    radius = np.append(np.zeros(P.dim), 1.0)
+    lifted = Rows(
+        np.vstack([np.hstack([P.A, norms[:, None]]), -radius]),
+        np.append(P.b, 0.0),
+        np.hstack([P.C, np.zeros((P.d.size, 1))]),
+        P.d,
+    )
+    best = maxima(lifted, radius[None])
+    assert best is not None  # P has a point, and r = 0 fits there
+    if np.isinf(best.values[0]):
+        return Ball(P.program.interior.point.copy(), np.inf)
+    return Ball(best.points[0, : P.dim], max(float(best.points[0, P.dim]), 0.0))

@@ -46,8 +46,7 @@ def vertices(P: Rows) -> Floats:
     chosen = np.searchsorted(program.kept, facets(program))
     rows, rhs = np.ascontiguousarray(program.AT[:, chosen].T), program.rhs[chosen]
     z = _interval_ends(rows, rhs) if len(free) == 1 else _vertices_in_frame(rows, rhs, program.centre)
-    lifted: Floats = program.flat.lift(z * program.columns)
-    return lifted
+    return program.lift(z)
 
 
 def _interval_ends(rows: Floats, rhs: Floats) -> Floats:

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from polytopes.kernel import elimination, facets, programs
+from polytopes.kernel import elimination, facets, programs, scaling
 from polytopes.kernel.sources import SOURCES
 
 _interior, _supports, _irredundant = programs.interior, programs.supports, facets.irredundant
-_eliminate = elimination.eliminate
+_eliminate, _exponents, _scaled = elimination.eliminate, scaling.exponents, scaling.scaled
 
 
 def _compiled(sources: str) -> tuple[Any, ...]:
@@ -33,7 +33,17 @@ def _compiled(sources: str) -> tuple[Any, ...]:
         sources  # noqa: B018
         return _eliminate(table, known, left, columns, inner, max_rows, cautious)
 
-    return interior, supports, irredundant, eliminate
+    @njit(cache=True)
+    def exponents(rows, rhs):
+        sources  # noqa: B018
+        return _exponents(rows, rhs)
+
+    @njit(cache=True)
+    def scaled(rows, rhs):
+        sources  # noqa: B018
+        return _scaled(rows, rhs)
+
+    return interior, supports, irredundant, eliminate, exponents, scaled
 
 
-interior, supports, irredundant, eliminate = _compiled(SOURCES)
+interior, supports, irredundant, eliminate, exponents, scaled = _compiled(SOURCES)

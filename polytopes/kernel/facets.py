@@ -60,7 +60,7 @@ def _precise_slack(AT: Matrix, b: Vector, x: Vector, i: int) -> float:
     return total + lost
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy")  # no reordering: it would reach into the precise slacks, once they are inlined
 def centred(AT: Matrix, b: Vector, x0: Vector) -> tuple[Matrix, Vector, bool]:
     """The rows seen from x0, both scaled as above; False if x0 is not strictly inside."""
     d, m = AT.shape

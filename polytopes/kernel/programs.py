@@ -3,13 +3,12 @@
 import numpy as np
 from numba import njit
 
-from polytopes.kernel.simplex import AMBIGUOUS, FAST, LIMIT, Index, Matrix, Vector, optimise, scale_of, start
+from polytopes.kernel.duality import dual_bound
+from polytopes.kernel.simplex import AMBIGUOUS, FAST, LIMIT, OPTIMAL, Index, Matrix, Vector, optimise, scale_of, start
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def interior(
-    AT: Matrix, b: Vector, norms: Vector, x0: Vector, cap: float
-) -> tuple[Vector, float, int, Vector]:
+def interior(AT: Matrix, b: Vector, norms: Vector, x0: Vector, cap: float) -> tuple[Vector, float, int, Vector]:
     """Largest ball ``a_i'x + |a_i| r <= b_i`` with ``r <= cap``.
 
     Parameters
@@ -85,10 +84,10 @@ def _nearest_order(directions: Matrix) -> Index:
     return order
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy")  # no reordering: it would reach into the bounds, whose rounding errors are computed
 def supports(
     AT: Matrix, b: Vector, x0: Vector, directions: Matrix
-) -> tuple[Matrix, Index, Matrix, Index]:
+) -> tuple[Matrix, Index, Matrix, Vector, Vector, Matrix, Index]:
     """Support points in k directions, each program started from the vertex of its neighbour.
 
     Parameters
@@ -101,13 +100,15 @@ def supports(
 
     Returns
     -------
-    points, active, multipliers, status
-        Arrays (k, d), (k, d), (k, d), (k,).  Points and multipliers mean something only where the status is `OPTIMAL`.
+    points, active, multipliers, bounds, spare, beside, status
+        Arrays (k, d), (k, d), (k, d), (k,), (k,), (k, d), (k,).  All but the last mean something only where the status
+        is `OPTIMAL`: then ``c'x <= bounds - spare + beside'|x|`` for all x of the set (see `dual_bound`).
     """
     d, m = AT.shape
     k = directions.shape[0]
     points = np.empty((k, d))
     active, multipliers, status = np.empty((k, d), np.int64), np.zeros((k, d)), np.empty(k, np.int64)
+    bounds, spare, beside = np.zeros(k), np.zeros(k), np.zeros((k, d))
     x, s, W, Q = np.empty(d), np.empty(m), np.empty(d, np.int64), np.empty((d, d))
     start(AT, b, x0, x, s, W, Q)
     scale = scale_of(b)
@@ -116,8 +117,8 @@ def supports(
         status[q] = optimise(AT, b, c, x, s, W, Q, y, scale)
         points[q] = x
         active[q] = W
+        if status[q] == OPTIMAL:
+            bounds[q], spare[q] = dual_bound(AT, b, c, W, Q, y, beside[q])
         if status[q] in (LIMIT, AMBIGUOUS):
             start(AT, b, x0, x, s, W, Q)
-    return points, active, multipliers, status
-
-
+    return points, active, multipliers, bounds, spare, beside, status

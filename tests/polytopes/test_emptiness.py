@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from random_programs import KINDS, many
 
 from polytopes import Certificate, HPolytope, UndecidedError, kernel
-from polytopes.exact import refutes
 from polytopes.highs import HighsOutcome, HighsProgram
 
 
@@ -158,11 +157,58 @@ def test_a_failed_solver_is_never_an_empty_set(monkeypatch: pytest.MonkeyPatch) 
         large.support(np.ones(50))
 
 
-def test_farkas_over_a_box_of_variables() -> None:
-    A, b = np.array([[1.0, 1.0]]), np.array([-3.0])
-    empty = np.empty((0, 2)), np.empty(0)
-    one = {0: fmpq(1)}
-    assert refutes(A, b, *empty, one, {}, box=(np.array([-1.0, -1.0]), np.array([np.inf, np.inf])))
-    assert not refutes(A, b, *empty, one, {}, box=(np.array([-1.5, -1.5]), np.array([1.0, 1.0])))
-    assert not refutes(A, b, *empty, one, {}, box=(np.array([-np.inf, -1.0]), np.array([1.0, 1.0])))
-    assert not refutes(A, b, *empty, one, {})
+def transport(supply: np.ndarray, demand: np.ndarray, capacity: float = np.inf) -> HPolytope:
+    """Flows x_ij >= 0 with given sums of rows and columns, each at most a capacity."""
+    n, m = len(supply), len(demand)
+    sums = np.vstack([np.kron(np.eye(n), np.ones(m)), np.kron(np.ones(n), np.eye(m))])
+    bounds = HPolytope.box(np.zeros(n * m), np.full(n * m, capacity))
+    return HPolytope(bounds.A, bounds.b, sums, np.append(supply, demand))
+
+
+@pytest.mark.parametrize("n", [2, 5, 7, 8, 10, 12])
+def test_transport_polytopes_are_decided(n: int) -> None:
+    """Full, with rows that must vanish, with decimals, with unequal sums and with too small a capacity."""
+    supply = np.arange(1.0, n + 1)
+    for P in (transport(supply, supply[::-1]), transport(np.append(0.0, supply[1:]), np.append(supply[1:], 0.0))):
+        answer = P.emptiness()
+        assert answer.status == "nonempty"
+        assert answer.witness is not None
+        assert P.contains(answer.witness)
+    thirds = transport(np.full(n, 1.0 / 3.0), np.full(n, 1.0 / 3.0)).emptiness()
+    assert thirds.status == "nonempty"
+    for P in (transport(supply, supply + 1.0), transport(supply, supply[::-1], 0.9)):
+        certificate = P.emptiness().certificate
+        assert certificate is not None
+        assert certificate.verify(P)
+
+
+def test_integer_equalities_are_decided() -> None:
+    """``C x = d``, x >= 0 in more variables than the rational simplex takes: around a sparse solution, or none."""
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        n, q = int(rng.integers(45, 70)), int(rng.integers(5, 20))
+        C, x = rng.integers(-3, 4, (q, n)).astype(float), rng.integers(0, 3, n) * (rng.random(n) < 0.5)
+        P = HPolytope(-np.eye(n), np.zeros(n), C, C @ x)
+        assert P.emptiness().status == "nonempty"
+        C[0], d = np.abs(C[0]) + 1.0, C @ x
+        d[0] = -1.0
+        Q = HPolytope(-np.eye(n), np.zeros(n), C, d)
+        certificate = Q.emptiness().certificate
+        assert certificate is not None
+        assert certificate.verify(Q)
+
+
+def test_a_set_that_touches_in_one_point_after_another_is_decided_on_its_faces() -> None:
+    """A chain of rows each of which is an equality only once the one before is: proofs come back to the first rows."""
+    n = 50
+    A = np.vstack([-np.eye(n), np.eye(n) - np.eye(n, k=1)])[: 2 * n - 1]  # x >= 0, x_i <= x_{i+1}
+    A = np.vstack([A, np.eye(1, n, n - 1)])  # and the last one <= 0
+    P = HPolytope(A, np.zeros(2 * n))
+    assert P.emptiness().status == "nonempty"
+    assert P.affine_dim() == 0
+    b = np.zeros(2 * n)
+    b[-1] = -(2.0**-60)
+    Q = HPolytope(A, b)
+    certificate = Q.emptiness().certificate
+    assert certificate is not None
+    assert certificate.verify(Q)

@@ -44,7 +44,9 @@ def test_support_and_bounds(name: str) -> None:
     assert finite.all() == (name not in UNBOUNDED)
     assert P.contains(result.points[finite]).all()
     assert np.isnan(result.points[~finite]).all()
-    np.testing.assert_allclose(np.sum(result.points * directions(P), axis=1)[finite], values[finite], rtol=1e-12)
+    np.testing.assert_allclose(
+        np.sum(result.points * directions(P), axis=1)[finite], values[finite], rtol=1e-12, atol=1e-15
+    )
     for j, axis in enumerate(np.eye(P.dim)):
         assert (lower[j], upper[j]) == pytest.approx((-P.support(-axis), P.support(axis)), abs=1e-15)
     ball = P.chebyshev()

@@ -115,7 +115,7 @@ def test_scaling_is_by_powers_of_two_only() -> None:
     A = rng.standard_normal((20, 3)) * 10.0 ** rng.uniform(-6, 6, (20, 1))
     program = prepare(A, rng.random(20), np.empty((0, 3)), np.empty(0))
     assert (np.frexp(program.scale)[0] == 0.5).all()
-    np.testing.assert_array_equal(program.AT.T / program.scale[:, None], A)
+    np.testing.assert_array_equal(program.AT.T / program.scale[:, None] / program.columns, A)
     assert (program.norms >= 0.5).all()
     assert (program.norms < 1.0).all()
 

@@ -1,0 +1,76 @@
+"""Upper bounds of linear forms from multipliers, whatever is rounded on the way: the compiled `dual_bound` in numpy.
+
+For x with ``A x <= b`` and y >= 0, ``c'x <= y'b + |c - A'y|'|x|``: a bound of |x| makes it a bound of ``c'x``, and the
+same bounds along the axes prove one of |x|.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes.affine import exact_sums
+
+Floats = NDArray[np.float64]
+_EPS = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """``c'x <= values - spare + beside'|x|`` for k forms c and all x of a set: arrays (k,), (k,) and (k, n)."""
+
+    values: Floats
+    spare: Floats
+    beside: Floats
+
+    def widened(self, values: Floats, beside: Floats) -> "Bounds":
+        """The bounds with errors (k,) and (k, n) added to both."""
+        sides = np.where(beside > 0.0, (self.beside + beside) * (1.0 + 1e-9), self.beside)
+        return Bounds(_raised(self.values, self.spare, values * (1.0 + 1e-9)), np.zeros_like(self.spare), sides)
+
+    def over(self, reach: Floats) -> Floats:
+        """Upper bounds (k,) of the forms where ``|x| <= reach``; inf where nothing bounds them."""
+        terms = self.beside * np.where(self.beside > 0.0, reach, 0.0)
+        return _raised(self.values, self.spare, terms.sum(axis=1) * (1.0 + (reach.size + 4) * _EPS))
+
+
+def _raised(values: Floats, spare: Floats, more: Floats) -> Floats:
+    """Floats that are at least ``values - spare + more``."""
+    return np.where(more > spare, np.nextafter(values + more, np.inf), values)
+
+
+def multiplier_bounds(AT: Floats, b: Floats, c: Floats, y: Floats) -> Bounds:
+    """Bounds of one form c (n,) by any multipliers y >= 0 (m,) of the rows; exact where no sum is rounded."""
+    used = np.flatnonzero(y)
+    table = np.hstack([AT.T, b[:, None]])[used]
+    sums = y[used] @ table
+    reach = np.abs(y[used]) @ np.abs(table)
+    reach[:-1] += np.abs(c)
+    errors = (used.size + 4) * _EPS * reach
+    given = np.append(c, 0.0)
+    for j in np.flatnonzero(reach):
+        if exact_sums(y[None, used], given[None, j], table[:, [j]], reach[None, [j]])[0, 0]:
+            errors[j] = 0.0
+    beside = np.abs(given - sums)[:-1]
+    beside = np.where(errors[:-1] > 0.0, np.nextafter(beside + errors[:-1], np.inf), beside)
+    value = np.nextafter(sums[-1] + errors[-1], np.inf) if errors[-1] > 0.0 else sums[-1]
+    return Bounds(np.array([value]), np.zeros(1), beside[None])
+
+
+def proved_reach(along: Bounds) -> Floats:
+    """Bounds (n,) of |x| from those along the axes and against them (2 n forms); inf where none is proved.
+
+    Of ``|x| <= v + G |x|`` with small G follows a bound of |x| itself, whichever x it is.
+    """
+    n = along.beside.shape[1]
+    values = np.maximum(np.maximum(along.values[:n], along.values[n:]), 0.0)
+    slopes = np.maximum(along.beside[:n], along.beside[n:])
+    known = np.isfinite(values) & np.isfinite(slopes).all(axis=1)
+    while known.any() and (slopes[known][:, ~known] > 0.0).any():
+        known &= ~(slopes[:, ~known] > 0.0).any(axis=1)
+    reach = np.full(n, np.inf)
+    if known.any():
+        inside = slopes[np.ix_(known, known)]
+        if inside.sum(axis=1).max() < 0.25:  # so that max |x| <= max v / (1 - 1/4)
+            reach[known] = (values[known] + inside.sum(axis=1) * 2.0 * values[known].max()) * (1.0 + 8.0 * _EPS)
+    return reach
