@@ -49,8 +49,9 @@ class HPolytope(Rows):
 
     Notes
     -----
-    Whether the set is empty is decided about exactly the floats that were given (see `emptiness`).  Every other number
-    is computed in floats from true vertices; supports agree with exact values to some 1e-13 of the size of the set.
+    Whether the set is empty is decided about exactly the floats that were given (see `emptiness`).  Supports
+    and boxes are rounded outward, and every other number is computed in floats from true vertices.  Coordinates and
+    rows are put into even units inside, so powers of two on them change nothing (see *Units* in the guide).
     """
 
     @classmethod
@@ -138,7 +139,8 @@ class HPolytope(Rows):
         Returns
         -------
         float or array (k,)
-            +inf where unbounded, -inf if the set is empty.
+            +inf where unbounded, -inf if the set is empty.  Never below the exact value, and above it by rounding only
+            (some 1e-13 of the size of the set); equal to it where nothing is rounded: integers and short fractions.
 
         Raises
         ------
@@ -153,6 +155,8 @@ class HPolytope(Rows):
 
     def bounding_box(self) -> tuple[Floats, Floats]:
         """Smallest box that contains the set: lower (n,) and upper (n,), infinite where unbounded; 2 n programs.
+
+        Rounded outward, as `support` is: every point of the set is in it.
 
         Raises
         ------
@@ -177,7 +181,7 @@ class HPolytope(Rows):
     def chebyshev(self) -> Ball:
         """A largest ball in the set (within the affine set of the equalities): centre and radius, inf if unlimited.
 
-        One linear program in n + 1 variables, solved already if emptiness was asked.
+        One linear program in n + 1 variables.
 
         Raises
         ------
@@ -267,10 +271,12 @@ class HPolytope(Rows):
     def remove_redundancy(self) -> Self:
         """The same set by a minimal description: independent equalities and one row per facet.
 
-        A row is dropped if the others imply it to within 1e-12 of its slack at the centre of the set (outward: the
-        result contains the set, and is at most 1 + 1e-12 times as large about that centre, whatever the scales of the
-        axes).  Implicit equalities become explicit, decided exactly.  One program a row, over the facets only
-        (Clarkson); a row that rounding leaves open is decided in rationals (milliseconds).
+        A row is dropped if the others imply it to within 1e-12 of its slack at the centre of the set.  Outward: the
+        result contains the set, and a bounded set is at most 1 + 1e-12 times as large about that centre, whatever the
+        scales of the axes; an unbounded one may also lose rows whose normals are combinations of others to within
+        rounding (1e-14), and then grows by that angle.  Implicit equalities become explicit, decided exactly.  One
+        program a row, over the facets only (Clarkson); a row that rounding leaves open is decided in rationals
+        (milliseconds).
         """
         return type(self)(*minimal_rows(self))
 

@@ -20,9 +20,10 @@ def minimal_rows(P: Rows) -> tuple[Floats, Floats, Floats, Floats]:
     """Minimal description A, b, C, d of P: independent equalities, and one row per facet.
 
     Implicit equalities become explicit.  With c the centre of a largest ball, a row is dropped if the others keep it
-    below ``a'c + (1 + 1e-12) (b - a'c)``: the result contains P and, whatever the shape and the scales of P, grows by
-    no more than that factor about c.  Rows that rounding leaves open are decided in coordinates where P is about a
-    unit ball, then in rationals.  The empty set is ``0'x <= -1``.
+    below ``a'c + (1 + 1e-12) (b - a'c)``: the result contains P and, whatever the shape and the scales of a bounded P,
+    grows by no more than that factor about c (of an unbounded P, rays are told apart to 1e-14).  Rows that rounding
+    leaves open are decided in coordinates where P is about a unit ball, then in rationals.  The empty set is
+    ``0'x <= -1``.
     """
     n = P.dim
     if not known_nonempty(P):

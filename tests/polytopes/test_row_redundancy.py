@@ -1,11 +1,14 @@
 """Minimal descriptions against the exact oracle, and the traps of near-duplicates."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from exact_sets import minimal_size, polyhedron
 from random_programs import many
 
 from polytopes import HPolytope
+from polytopes.kernel.facets import centred
 from polytopes.linear_program import Program
 from polytopes.redundancy import irredundant
 
@@ -68,3 +71,17 @@ def test_a_row_of_cancellation_does_not_set_the_tolerance() -> None:
 def test_a_far_row_does_not_loosen_the_others() -> None:
     cut = HPolytope.box([-1.0, -1.0], [1.0, 1.0]).intersection(HPolytope([[1.0, 1.0], [1.0, 0.0]], [2.0 - 1e-6, 1e9]))
     assert cut.remove_redundancy().b.size == 5
+
+
+def test_slacks_at_the_centre_have_twice_the_precision() -> None:
+    """Compiled with reordering allowed, the sum that holds what was rounded off is optimised away."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        A, x = rng.standard_normal((6, 3)), rng.standard_normal(3)
+        b = A @ x + 1e-15 * rng.random(6)
+        _, rhs, inside = centred(np.ascontiguousarray(A.T), b, x)
+        exact = [Fraction(v) - sum(Fraction(p) * Fraction(q) for p, q in zip(row, x.tolist(), strict=True))
+                 for row, v in zip(A.tolist(), b.tolist(), strict=True)]  # fmt: skip
+        assert inside == all(v > 0 for v in exact)
+        if inside:
+            np.testing.assert_allclose(rhs, [np.frexp(float(v))[0] for v in exact], rtol=1e-14)
