@@ -61,7 +61,7 @@ def irredundant(AT: Floats, b: Floats, inner: Floats) -> Indices:
         A point strictly inside.
     """
     warm_up()
-    inner = np.ascontiguousarray(inner)
+    AT, b, inner = np.ascontiguousarray(AT), np.ascontiguousarray(b), np.ascontiguousarray(inner)
     kept, doubtful = kernel.irredundant(AT, b, inner)
     return kept[settle(AT[:, kept].T, b[kept], inner, doubtful)] if doubtful.any() else kept
 
@@ -75,7 +75,8 @@ def settle(A: Floats, b: Floats, inner: Floats, doubtful: Indices) -> Indices:
     kept = np.arange(b.size)
     body = unit_body(A, b, inner)
     if body is not None:
-        kept, doubtful = kernel.irredundant(np.ascontiguousarray(body.rows.T), body.rhs, body.inner)
+        rows, rhs = np.ascontiguousarray(body.rows.T), np.ascontiguousarray(body.rhs)
+        kept, doubtful = kernel.irredundant(rows, rhs, body.inner)
     stays = np.ones(kept.size, dtype=bool)
     for k in np.flatnonzero(doubtful):
         stays[k] = False
