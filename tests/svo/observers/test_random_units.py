@@ -123,7 +123,7 @@ def test_the_order_of_states_and_sensors_does_not_matter(seed: int) -> None:
     a, b = WindowObserver(one, box).run(log), WindowObserver(two, box).run(replace(log, y=log.y[:, sensors]))
     assert a.verdicts == b.verdicts
     width = (a.upper - a.lower)[:, order]
-    # which side of an s is bounded first depends on the order, and may settle its sign
+    # 1e-6 of the width is wanted; up to 9e-4 was seen (seeds 10, 11, 149), the cause is not found yet
     assert (np.abs(a.lower[:, order] - b.lower) <= 1e-2 * width).all()
     assert (np.abs(a.upper[:, order] - b.upper) <= 1e-2 * width).all()
 
