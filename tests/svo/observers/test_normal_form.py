@@ -64,7 +64,7 @@ def same(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def memory(observer: Any) -> dict[str, np.ndarray]:
-    return {k: v for k, v in observer.state_dict().items() if not k.startswith("exponents.")}
+    return {k: v for k, v in observer.state_dict().items() if not k.startswith(("exponents.", "seal."))}
 
 
 def compare(make: Any, units: Units, model: UncertainModel, start: HPolytope, log: Any) -> Any:
