@@ -23,7 +23,7 @@ from svo.terminal import console, line, plain, safe_output
 CART = Path(__file__).parents[2] / "docs" / "examples" / "cart.toml"
 LOG = CART.with_suffix(".csv")
 ESCAPES = ["\x1b[31m", "\x1b]0;owned\x07", "\x9b2J", "\x08\x08", "\x7f", "\x00", "‮", "\u2028", "!"]
-HOSTILE = "".join(ESCAPES)
+HOSTILE = "".join(ESCAPES).replace("\x00", "")  # a watch takes no line with NUL bytes for text
 
 
 def svo(*arguments: str | Path) -> Any:

@@ -3,7 +3,8 @@ from __future__ import annotations
 import pytest
 
 from svo.plant import load_plant
-from svo.study.configuration import StudyConfiguration, check_fault, versions
+from svo.store import versions
+from svo.study.configuration import StudyConfiguration, check_fault
 
 
 def seeds(tank: str, **changes: object) -> dict[tuple[str, str, str, int], int]:
