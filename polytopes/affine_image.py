@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.generators import in_integers
-from polytopes.integers import exact_product, integer_rows
+from polytopes.integers import exact_product, integer_rows, short
 from polytopes.minkowski_weyl import image
 from polytopes.outer_supports import upper_supports
 from polytopes.outward import float_rows
@@ -22,9 +22,10 @@ def affine_image(P: Rows, M: Floats, t: Floats) -> Table:
     """Rows A, b, C, d of the image, for any matrix M (p, n) and shift t (p,).
 
     ``A inv(M)``, where that needs no rounding (a permutation, integers of determinant one, powers of two).  The hull of
-    the images of the generators, in integers, where P is computed with in integers or is unbounded.  Else P is bounded
-    and full-dimensional: normals ``A inv(M)`` for a well-conditioned square map, or those of the projection of
-    ``{(z, x) : z = M x + t, x in P}``, with supports rounded up.
+    the images of the generators, in integers, where P is computed with in integers and P or its image is flat or thin
+    or the map short, and where P is unbounded.  Else P is bounded and full-dimensional: normals ``A inv(M)`` for a
+    well-conditioned square map, or those of the projection of ``{(z, x) : z = M x + t, x in P}``, with supports
+    rounded up.
     """
     p, n = M.shape
     if not known_nonempty(P):
@@ -33,8 +34,9 @@ def affine_image(P: Rows, M: Floats, t: Floats) -> Table:
     moved = _moved_rows(P, M, t) if square else None
     if moved is not None:
         return moved
-    if P.exact is not None or not is_bounded(P):
-        *whole, scale = integer_rows(np.append(np.hstack([M, t[:, None]]).ravel(), 1.0)[None])[0].tolist()
+    numbers = integer_rows(np.append(np.hstack([M, t[:, None]]).ravel(), 1.0)[None])
+    if not is_bounded(P) or (P.exact is not None and (short(numbers) or not (square and P.wide))):
+        *whole, scale = numbers[0].tolist()
         table = np.array(whole, dtype=object).reshape(p, n + 1)
         return float_rows(image(in_integers(P), table[:, :-1], table[:, -1], scale))
     normals = _normals(P, M, t, square)
