@@ -21,7 +21,7 @@ from polytopes.pontryagin_difference import pontryagin_difference
 from polytopes.preimage import preimage
 from polytopes.product import product
 from polytopes.redundancy import minimal_rows
-from polytopes.rows import Rows, same_space
+from polytopes.rows import Rows, a_set, same_space
 from polytopes.support import Ball, SupportResult
 from polytopes.vertices import vertices
 from polytopes.volume import volume
@@ -288,7 +288,7 @@ class HPolytope(Rows):
 
     def product(self, Q: Rows) -> Self:
         """Cartesian product ``{(x, y) : x in P, y in Q}``."""
-        return type(self)(*product(self, Q))
+        return type(self)(*product(self, a_set(Q)))
 
     def preimage(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
         """``{x : M x + t in P}``: rows multiplied out, outward where they had to be rounded.

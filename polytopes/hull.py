@@ -45,14 +45,14 @@ def hull_normals(V: Floats) -> tuple[Floats, Floats]:
     offsets = (V - V.mean(axis=0)) / scale
     sizes, axes = principal_axes(offsets)
     rank = numeric_rank(sizes)
-    across = _unit(axes[rank:] / scale)
+    across = _unit(_divided(axes[rank:], scale))
     if rank == 0:
         return np.empty((0, n)), across
     found = _facets(offsets @ axes[:rank].T / sizes[:rank])
     rows = found.rows[:, :-1]
     if not found.certain():
         rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(rank))]
-    return _unit(rows / sizes[:rank] @ axes[:rank] / scale), across
+    return _unit(_divided(rows / sizes[:rank] @ axes[:rank], scale)), across
 
 
 def nearly_flat(V: Floats, rays: Floats) -> Floats:
@@ -67,7 +67,7 @@ def nearly_flat(V: Floats, rays: Floats) -> Floats:
     both = np.vstack([V, ahead])
     scale = axis_scales(both)
     sizes, axes = principal_axes((both - V.mean(axis=0)) / scale)
-    return _unit(axes[numeric_rank(sizes) :] / scale)
+    return _unit(_divided(axes[numeric_rank(sizes) :], scale))
 
 
 def numeric_rank(sizes: Floats) -> int:
@@ -84,6 +84,14 @@ def point_offsets(V: Floats) -> Callable[[Floats], Floats]:
         return bounds
 
     return offsets
+
+
+def _divided(rows: Floats, scale: Floats) -> Floats:
+    """The directions of rows / scale, whose largest entries stay near one where a quotient would leave the floats."""
+    powers = np.frexp(scale)[1]
+    sizes = np.where(rows != 0.0, np.frexp(rows)[1] - powers, np.iinfo(np.int32).min)
+    divided: Floats = np.ldexp(rows / np.ldexp(scale, -powers), -powers - sizes.max(axis=1, keepdims=True))
+    return divided
 
 
 def _unit(rows: Floats) -> Floats:

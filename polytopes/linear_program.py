@@ -293,7 +293,9 @@ class Program:
         k = directions.shape[0]
         reduced, tops, constants = program._scaled_forms(directions)
         found = program._solve(reduced)
-        values = np.ldexp(program._proved(directions, reduced, tops, found), tops)
+        with np.errstate(over="ignore"):  # a bound beyond floats: none above, the least float below
+            values = np.ldexp(program._proved(directions, reduced, tops, found), tops)
+        values = np.maximum(values, -np.finfo(np.float64).max)
         values = program._with_constants(directions, values, constants)
         lifted, multipliers = program.lift(found.points), np.zeros((k, self.b.size))
         multipliers[:, self.kept] = np.ldexp(found.weights, program.row_powers + tops[:, None])

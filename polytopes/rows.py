@@ -93,10 +93,15 @@ def everything(n: int) -> Table:
     return np.empty((0, n)), np.empty(0), np.empty((0, n)), np.empty(0)
 
 
-def same_space(P: Rows, Q: Rows) -> Rows:
-    """Q itself, if it is a set in the space of P; TypeError or ValueError otherwise."""
+def a_set(Q: Rows) -> Rows:
+    """Q itself, if it is a set; TypeError otherwise."""
     if not isinstance(Q, Rows):
         raise TypeError(f"Q is a {type(Q).__name__}; expected an HPolytope.")
-    if Q.dim != P.dim:
+    return Q
+
+
+def same_space(P: Rows, Q: Rows) -> Rows:
+    """Q itself, if it is a set in the space of P; TypeError or ValueError otherwise."""
+    if a_set(Q).dim != P.dim:
         raise ValueError(f"Q has dimension {Q.dim}; expected {P.dim}, the dimension of this set.")
     return Q

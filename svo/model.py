@@ -400,8 +400,12 @@ class UncertainModel:
             "outputs": self.n_outputs,
             "disturbances": self.n_disturbances,
         }
+        if self.names is not None and not isinstance(self.names, Mapping):
+            raise TypeError(f"names is {self.names!r:.80}; expected a table from any of {', '.join(sizes)} to names")
         for key, values in (self.names or {}).items():
             if key not in sizes:
                 raise ValueError(f"names has the key {key!r}; expected any of {', '.join(sizes)}")
+            if isinstance(values, str) or not hasattr(values, "__len__"):
+                raise TypeError(f"names[{key!r}] is {values!r:.80}; expected a list of {sizes[key]} names")
             if len(values) != sizes[key]:
                 raise ValueError(f"names[{key!r}] has {len(values)} entries; expected {sizes[key]}")

@@ -48,6 +48,8 @@ def saved_state(bank: Bank) -> State:
 
 def restore_state(bank: Bank, state: Mapping[str, NDArray[Any]]) -> None:
     """See `Bank.load_state_dict`."""
+    if not isinstance(state, Mapping):
+        raise TypeError(f"state is a {type(state).__name__}; expected the named arrays that state_dict() gave")
     try:
         conclusions = json.loads(str(state["bank.conclusions"]))
         if conclusions["kind"] != _kind(bank):
