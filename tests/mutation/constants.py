@@ -1,0 +1,94 @@
+"""Every tolerance of the Python side: what it is, and what must happen when it is changed.
+
+An outward-rounding constant set to zero must fail a test of soundness with an adversarial input. A tolerance times 1000
+must fail a test of tightness; a heuristic one, which decides only how much work is done or how wide a set is, must
+leave `tests/soundness_core` green. The table of `docs/theory.md` has the same rows (`test_table.py`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Literal
+
+Kind = Literal["outward", "tolerance", "heuristic"]
+CORE = "tests/soundness_core"
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number in a module, and the test that must notice when it changes (none for a heuristic one)."""
+
+    module: str
+    name: str
+    kind: Kind
+    test: str = CORE
+
+    def __str__(self) -> str:
+        return f"{self.module}:{self.name}"
+
+    @property
+    def value(self) -> float:
+        return float(getattr(import_module(self.module), self.name))
+
+    @property
+    def changed(self) -> float:
+        """The value of the mutant."""
+        return 0.0 if self.kind == "outward" else 1000.0 * self.value
+
+
+OBSERVERS = "tests/svo/observers"
+SETS = "tests/polytopes"
+
+CONSTANTS = (
+    Constant("svo.discretisation", "_ROUNDED_UP", "outward", "tests/svo/test_inside_a_sample.py"),
+    Constant("svo.reachable_set", "_ROUNDING", "outward", "tests/svo/test_reachable_set.py"),
+    Constant("svo.calibration", "_ROUNDED_UP", "outward", "tests/svo/test_calibration.py"),
+    Constant("svo.elastic_program", "ROUNDING", "outward", "tests/svo/test_calibration.py"),
+    Constant("svo.state_range", "_EPS", "outward", CORE),
+    Constant("svo.observers.constrained_zonotope", "EPS", "outward", CORE),
+    Constant("svo.observers.vertex_images", "_OUTWARD", "outward", CORE),
+    Constant("svo.observers.output_injection", "_UNIT", "outward", f"{OBSERVERS}/test_output_injection.py"),
+    Constant("svo.residual_tests.threshold", "_ROUNDING", "outward", "tests/svo/residual_tests"),
+    Constant("polytopes.outer_supports", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.outward_normals", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.duality", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.affine", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.linear_program", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.hull", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.affine_image", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.preimage", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.emptiness", "_EPS", "outward", f"{SETS}/test_emptiness.py"),
+    Constant("svo.log_columns", "TIME_TOLERANCE", "tolerance", "tests/svo/test_log_file.py"),
+    Constant("svo.calibration", "NEGLIGIBLE", "tolerance", "tests/svo/test_calibration.py"),
+    Constant("svo.model_pair", "LEAST_SEPARATION", "tolerance", "tests/svo/test_distinguishability.py"),
+    Constant("svo.faults.profiles", "EDGE_TOLERANCE_S", "tolerance", "tests/svo/test_faults.py"),
+    Constant("svo.input_design", "_DECREASE", "heuristic"),
+    Constant("svo.sparse_program", "FEASIBILITY", "heuristic"),
+    Constant("svo.model_pair", "_DELTA_TOLERANCE", "heuristic"),
+    Constant("svo.observers.window_restart", "_BLURRED", "heuristic"),
+    Constant("svo.observers.sign_split", "_INEXACT", "heuristic"),
+    Constant("svo.observers.constrained_zonotope", "_PIVOT", "heuristic"),
+    Constant("svo.observers.zonotope_reduction", "_RANK", "heuristic"),
+    Constant("svo.observers.zonotope_reduction", "_EQUALITY", "heuristic"),
+    Constant("polytopes.outer_supports", "_SHARP", "heuristic"),
+    Constant("polytopes.pontryagin_difference", "_CONSTANT", "heuristic"),
+    Constant("polytopes.pontryagin_difference", "_ROUNDED", "heuristic"),
+    Constant("polytopes.hull", "_FLAT", "heuristic"),
+    Constant("polytopes.hull", "_NOISE", "heuristic"),
+    Constant("polytopes.hull", "_TOUCHING", "heuristic"),
+    Constant("polytopes.hull", "_ALIKE", "heuristic"),
+    Constant("polytopes.hull", "_REACHED", "heuristic"),
+    Constant("polytopes.vertices", "_SAME", "heuristic"),
+    Constant("polytopes.vertices", "_RANK", "heuristic"),
+    Constant("polytopes.linear_program", "_CLEAN", "heuristic"),
+    Constant("polytopes.linear_program", "_THIN", "heuristic"),
+    Constant("polytopes.linear_program", "_SMALL_BALL", "heuristic"),
+    Constant("polytopes.linear_program", "_NOISE", "heuristic"),
+    Constant("polytopes.linear_program", "_SHARP", "heuristic"),
+    Constant("polytopes.certificate", "_ZERO_WEIGHT", "heuristic"),
+    Constant("polytopes.frame", "_NOISE", "heuristic"),
+    Constant("polytopes.hull", "_SLIVER", "heuristic"),
+    Constant("polytopes.exact", "_CANCELLING", "heuristic"),
+    Constant("polytopes.exact_generators", "_WIDE", "heuristic"),
+)
