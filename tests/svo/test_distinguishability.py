@@ -224,3 +224,11 @@ def test_the_command_refuses_a_horizon_beyond_the_flight() -> None:
 def test_help_has_an_example(command: str) -> None:
     result = CliRunner().invoke(app, [command, "--help"])
     assert f"Example: svo {command} eclipse" in " ".join(result.stdout.split())
+
+
+@pytest.mark.parametrize("share", [1e-4, 1e-5])
+def test_a_separation_of_a_ten_thousandth_of_the_noise_is_seen(share: float) -> None:
+    faulty = integrator().replace(c=[0.2 * (1.0 + share)])
+    answer = distinguishability(faulty, integrator(), 3, initial=POINT, u=np.zeros((3, 1)))
+    assert (answer.horizon, answer.exact, answer.witness) == (1, True, None)
+    assert answer.separation == pytest.approx(share, rel=1e-2)

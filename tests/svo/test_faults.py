@@ -398,3 +398,9 @@ def test_channels_that_do_not_exist_are_refused() -> None:
         locked.corrupt(0.0, [0.0])
     with pytest.raises(ValueError, match=r"held has shape \(2,\)"):
         locked.corrupt(0.0, [0.0], held=[0.0, 0.0])
+
+
+def test_an_edge_is_met_within_a_nanosecond_and_not_within_half_a_microsecond() -> None:
+    for early, value in ((5e-10, 1.0), (5e-9, 0.0), (5e-7, 0.0)):
+        assert Step(1.0).value(1.0 - early) == value
+        assert Intermittent(0.0, 2.0).value(2.0 - early) == value
