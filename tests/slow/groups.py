@@ -36,6 +36,8 @@ COMMANDS = {
         ("benchmarks.soundness", "--observer", "zonotope", "--samples", "30000"),
         ("benchmarks.soundness", "--observer", "polytope", "--samples", "10000"),
     ),
+    "mutation": (("tests.mutation",),),
+    "fuzz": (("tests.fuzz", "--cases", "3000"),),
 }
 
 
