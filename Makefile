@@ -15,7 +15,10 @@ demo: $(VENV)/.study
 	$(BIN)/svo verify $(STUDY)/alarms.jsonl
 	@echo "Open $(STUDY)/report.html in a browser; everything else is beside it."
 
-test: lint
+# Linter and types while the kernels compile, then the tests.
+test: $(VENV)/.dev
+	@$(BIN)/python -m tests.compiled & compiling=$$!; \
+	  $(MAKE) --no-print-directory lint || { kill $$compiling; exit 1; }; wait $$compiling
 	$(BIN)/python -m pytest -n 2
 
 # The long checks, an hour of CPU in named groups (make test-slow GROUPS="soundness polytopes"); a stopped run goes on.

@@ -83,7 +83,7 @@ def test_a_bar_of_life_ends_with_the_delay(tank: Plant) -> None:
     nominal, leak, gauge = (patch.get_x() + patch.get_width() for patch in ax.patches)
     assert (nominal, gauge) == pytest.approx((1.1, 1.6))  # fault at 1.0 s, alarm at 2.0 s, plus one sampling time
     assert leak == pytest.approx(ax.get_xlim()[1])
-    assert [text.get_text().strip() for text in ax.texts] == ["1.10 s", "1.60 s"]
+    assert [text.get_text().strip() for text in ax.texts] == ["1.1 s", "1.6 s"]
 
 
 def test_sets_are_drawn_with_the_true_state_in_them(tank: Plant) -> None:
