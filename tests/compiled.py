@@ -22,25 +22,25 @@ def observer(**options: Any) -> WindowObserver:
 
 
 def whole_samples() -> None:
-    """The kernel that takes a sample with all its programs: half of the work."""
+    """The kernel that takes a sample with all its programs, and the simulators."""
     observer().update([0.0])
+    for name in ("eclipse", "elevator", "missile"):
+        plant = load_plant(name)
+        plant.simulate("none", "none", plant.noise_sets[0], 0)
 
 
-def everything_else() -> None:
+def sets_and_parts_of_samples() -> None:
     """A window that splits by signs takes its samples in parts."""
     polytopes.warm_up()
     in_parts = observer(sign_split=2)
     in_parts.update([0.0])
     in_parts.step(u=[0.0], y=[0.0]).box  # noqa: B018
     in_parts.late_update([np.nan], 0)
-    for name in ("eclipse", "elevator", "missile"):
-        plant = load_plant(name)
-        plant.simulate("none", "none", plant.noise_sets[0], 0)
 
 
 def main() -> None:
     context = multiprocessing.get_context("spawn")
-    workers = [context.Process(target=part) for part in (whole_samples, everything_else)]
+    workers = [context.Process(target=part) for part in (whole_samples, sets_and_parts_of_samples)]
     for worker in workers:
         worker.start()
     for worker in workers:

@@ -23,7 +23,7 @@ def passes(constant: Constant) -> bool:
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=SECONDS)
     except subprocess.TimeoutExpired:
-        return False
+        raise SystemExit(f"{constant}: {constant.test} took more than {SECONDS} s") from None
     if done.returncode not in (0, 1):
         raise SystemExit(f"{constant}: {constant.test} did not run:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
     return done.returncode == 0

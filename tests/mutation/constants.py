@@ -50,6 +50,7 @@ CONSTANTS = (
     Constant("svo.observers.vertex_images", "_OUTWARD", "outward", ROUNDED),
     Constant("svo.observers.output_injection", "_UNIT", "outward", ROUNDED),
     Constant("svo.residual_tests.threshold", "_ROUNDING", "outward", "tests/svo/residual_tests"),
+    Constant("svo.interval.thresholds", "_EPS", "outward", "tests/svo/interval/test_rounding.py"),
     Constant("polytopes.outer_supports", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.outward_normals", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.duality", "_EPS", "outward", ROUNDED),
