@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
@@ -117,13 +115,12 @@ def test_a_long_log_is_explained_by_one_trajectory_in_pieces() -> None:
     assert is_explained(found.model, log)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    raises=AssertionError,
-    reason="A16: of 60 random plants with uncertainties 3 are still falsified, by less than 1 % (seeds 505, 521, 530)",
+SHORT = pytest.mark.xfail(
+    strict=True, raises=AssertionError, reason="A16: some widenings are up to 1 % too small with uncertainties"
 )
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 10**6))
+
+
+@pytest.mark.parametrize("seed", [*range(531, 556), *(pytest.param(seed, marks=SHORT) for seed in (505, 521, 530))])
 def test_whatever_the_plant_the_widened_model_explains_the_log(seed: int) -> None:
     rng = np.random.default_rng(seed)
     plant = random_plant(rng, largest=3)
