@@ -37,7 +37,7 @@ class Constant:
         return 0.0 if self.kind == "outward" else 1000.0 * self.value
 
 
-ROUNDED = f"{CORE}/test_outward.py"
+ROUNDED = f"{CORE}/test_rounding_outward.py"
 SETS = "tests/polytopes"
 
 CONSTANTS = (
