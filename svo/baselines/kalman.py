@@ -15,7 +15,8 @@ from svo.checks import finite_array, readings
 from svo.log import Log
 
 Array = NDArray[np.float64]
-_STABLE = 1 - 1e-9
+_STABLE = 1e-9  # how far inside the unit circle a mode must be to count as stable
+_UNSEEN = 1e-9  # of |A|: singular value of a mode that the outputs do not see
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,8 @@ def unknown_input_exists(A: ArrayLike, C: ArrayLike, E: ArrayLike, D: ArrayLike 
     modes: NDArray[np.complex128] = np.linalg.eigvals(error).astype(complex)
     for value in modes:
         pencil = np.vstack([value * np.eye(n) - error, seen])
-        if abs(value) >= _STABLE and np.linalg.matrix_rank(pencil, tol=1e-9 * max(1.0, float(np.linalg.norm(A)))) < n:
+        unseen = _UNSEEN * max(1.0, float(np.linalg.norm(A)))
+        if abs(value) >= 1.0 - _STABLE and np.linalg.matrix_rank(pencil, tol=unseen) < n:
             raise ValueError(
                 f"the error has a mode at {_number(value)} that the decoupled outputs do not see; expected all such "
                 "modes inside the unit circle (detectability), so name fewer unknown inputs"

@@ -15,7 +15,7 @@ from svo.interval import IntervalPrediction, IntervalPredictor, NoiseCharacteriz
 from svo.log import Log
 
 Array = NDArray[np.float64]
-_HAIR = 1 + 1e-9  # a safety factor that leaves the whole choice to the level
+_HAIR = 1e-9  # above 1: a safety factor that leaves the whole choice to the level
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class IntervalThreshold(ThresholdDetector):
 
     def learn(self, parameters: Mapping[str, float], healthy: Sequence[Any]) -> Mapping[str, Array]:
         residuals = [prediction.residual for prediction in healthy]
-        return {"bounds": NoiseCharacterization.from_records(residuals, self.qbar, _HAIR).bounds}
+        return {"bounds": NoiseCharacterization.from_records(residuals, self.qbar, 1.0 + _HAIR).bounds}
 
     def scores(self, setting: Setting, prepared: IntervalPrediction) -> Array:
         filtered = first_order_filter(prepared.residual, self.pole)

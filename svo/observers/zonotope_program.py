@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from svo.observers.constrained_zonotope import ConstrainedZonotope, unit
 
 Array = NDArray[np.float64]
-_INSIDE = 1.0 - 1e-9  # of the unit ball: how far inside a point must be to count without a program
+_INSIDE = 1e-9  # how far inside the unit ball a point must be to count without a program
+_MISFIT = 1e-12  # of the constraints, up to which it satisfies them
 _PLAIN = {"output_flag": False, "threads": 1, "solver": "simplex", "presolve": "off", "simplex_scale_strategy": 0}
 
 
@@ -105,8 +106,8 @@ class ZonotopeProgram:
             point = A.T @ np.linalg.solve(A @ A.T, target)
         except np.linalg.LinAlgError:
             return False
-        exact = np.abs(A @ point - target).max() <= 1e-12 * max(1.0, float(np.abs(target).max()))
-        return bool(np.abs(point).max() <= _INSIDE and exact)
+        exact = np.abs(A @ point - target).max() <= _MISFIT * max(1.0, float(np.abs(target).max()))
+        return bool(np.abs(point).max() <= 1.0 - _INSIDE and exact)
 
     def _open(self) -> None:
         if self._solver is not None:

@@ -171,6 +171,16 @@ def test_existence_of_unknown_input_observers():
         InnovationFilter(GaussianModel(plant(), BOX), state_input=[1.0, 0.0, 0.0])
 
 
+def test_modes_that_decay_slowly_or_are_seen_weakly_are_no_obstacle():
+    """By 1e-7 a sample, and by 1e-7 of the outputs."""
+    into_first, blind = [[1.0], [0.0]], np.array([[1.0, 0.0], [1.0, 0.0]])
+    unknown_input_exists(np.array([[0.5, 1.0], [0.0, 1.0 - 1e-7]]), blind, into_first)
+    with pytest.raises(ValueError, match="mode at 1 "):
+        unknown_input_exists(np.array([[0.5, 1.0], [0.0, 1.0]]), blind, into_first)
+    weak = np.array([[1.0, 0.0], [1.0, 1e-7]])
+    unknown_input_exists(np.array([[0.5, 1.0], [0.0, 1.2]]), weak, into_first)
+
+
 def test_effect_of_a_fault_is_what_the_simulations_differ_by(log):
     healthy, faulty = scheduled(), scheduled().replace(B=[[0.5], [0.0], [0.25]], c=[0.5, 0.2, 0.0])
     nominal, other = (GaussianModel(m, BOX).samples(log) for m in (healthy, faulty))

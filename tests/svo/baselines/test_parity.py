@@ -68,6 +68,20 @@ def test_a_fault_of_any_size_is_explained_by_its_own_signature(log):
     assert faulty.unexplained[10, 1] == pytest.approx(float(squares[0]), rel=1e-9)
 
 
+def test_a_fault_that_a_state_explains_but_for_a_hundred_thousandth_is_still_seen(log):
+    """What an initial state of 1 does to the outputs, and 1e-5 of a bias on top."""
+    order, K = 5, 6
+    free = np.array([C @ np.linalg.matrix_power(A, k) @ [1.0, -1.0] for k in range(K)])
+    bias = 1e-5 * np.array([1.0, 0.0])
+    short = Log(log.time[:K], log.u[:K], log.y[:K] + 1e6 * bias)
+    record = ParitySpace(MODEL, order).over(MODEL.samples(short), [(np.zeros((K, 2)), free + bias)])
+    plain = ParitySpace(MODEL, order).over(MODEL.samples(short), [(np.zeros((K, 2)), np.tile(bias, (K, 1)))])
+    assert record.unexplained[order, 0] == pytest.approx(plain.unexplained[order, 0], rel=1e-4)
+    assert record.unexplained[order, 0] < 0.1 * record.squares[order]
+    gone = ParitySpace(MODEL, order).over(MODEL.samples(short), [(np.zeros((K, 2)), free)])
+    assert gone.unexplained[order, 0] == gone.squares[order]
+
+
 def test_wrong_arguments_are_named(log):
     with pytest.raises(ValueError, match="order is 0"):
         ParitySpace(MODEL, 0)
