@@ -8,10 +8,10 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import butter, sosfilt
 
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 RMS_PER_BOUND = 1 / 2.5
 Distribution = Literal["bounded", "gaussian"]

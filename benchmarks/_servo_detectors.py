@@ -20,9 +20,9 @@ from svo.interval import (
     first_order_schedule,
 )
 from svo.interval.identification import FirstOrderFit, identify_first_order
-from svo.log import Log
-from svo.observers.window import WindowObserver
-from svo.observers.window_step import WindowStep
+from svo.logs.log import Log
+from svo.observers.window.observer import WindowObserver
+from svo.observers.window.step import WindowStep
 
 SAFETY = 1.2
 QBAR = 200

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks._servo_detectors import learn, predictor
 from benchmarks._servo_records import halves, jam, record
 from svo.interval import IntervalDetector, IntervalRecord
-from svo.log import Log
+from svo.logs.log import Log
 
 POLE = 0.95
 JAM = 5480  # sample of the second half

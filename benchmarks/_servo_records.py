@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from svo.log import Log
-from svo.log_file import read_log
+from svo.logs.file import read_log
+from svo.logs.log import Log
 from svo.plant import Column, Columns
 
 VARIABLE = "SVO_DATA"

@@ -24,11 +24,11 @@ from benchmarks._window_references import (
     ScaledSamples,
 )
 from benchmarks._window_runs import HORIZON, SETTLE, TURN, Sample, Times, drive, observer_of
-from svo.log import Log
-from svo.model import UncertainModel
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 from svo.observers import window_kernel as kernel
-from svo.observers.window import WindowObserver
-from svo.observers.window_step import WindowStep
+from svo.observers.window.observer import WindowObserver
+from svo.observers.window.step import WindowStep
 
 HIGHS_SAMPLES, CVXPY_SAMPLES = 300, 60
 GOALS = {"HiGHS, warm": "15", "cvxpy + Clarabel": "100"}

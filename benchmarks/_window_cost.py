@@ -17,8 +17,8 @@ from rich.table import Table
 from aircraft.eclipse.plant import Eclipse
 from benchmarks._window_runs import HORIZON, NOISE, SCHEDULES, SEED, SETTLE, TURN, Sample, Times, drive, observer_of
 from svo.isolation.bank import Bank
-from svo.log import Log
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.observers.window.observer import WindowObserver
 
 HORIZONS = (1, 5, 10, 20, 50)
 

@@ -19,8 +19,8 @@ import highspy
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.log import Log
-from svo.model import UncertainModel
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 
 Floats = NDArray[np.float64]
 Options = dict[str, bool | int | float | str]

@@ -12,9 +12,9 @@ from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER
 from benchmarks._window_references import Floats
 from polytopes import HPolytope
 from svo.isolation.bank import Bank
-from svo.log import Log
-from svo.model import UncertainModel
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
+from svo.observers.window.observer import WindowObserver
 
 NOISE, SEED, HORIZON = "quiet", 20_130_613, 10
 SCHEDULES = ("as used", "every sample")

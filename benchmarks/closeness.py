@@ -22,7 +22,7 @@ from benchmarks._observers import OBSERVERS, arguments, console, linear_plant, o
 from polytopes import HPolytope
 from svo import UncertainModel
 from svo.faults import Ramp, SensorFault, Step
-from svo.log import Log
+from svo.logs.log import Log
 
 SEED, SAMPLES, FAULT_AT, HORIZONS = 20_261_126, 45, 15, (1, 2, 5, 10, 20)
 Start = Callable[[UncertainModel, HPolytope], Any]

@@ -21,9 +21,9 @@ from rich.progress import track
 from rich.table import Table
 
 from svo.plant import HEALTHY, Plant, load_plant
-from svo.study.configuration import Job, StudyConfiguration
-from svo.study.run import first_faulty_sample
-from svo.study.runner import warm_up
+from svo.studies.configuration import Job, StudyConfiguration
+from svo.studies.isolation.run import first_faulty_sample
+from svo.studies.isolation.runner import warm_up
 
 PLANT = "eclipse"
 SEED = 734_190_006

@@ -28,7 +28,7 @@ from benchmarks._window_references import DUAL, PRIMAL, CvxpyWindow
 from benchmarks._window_runs import Times
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
-from svo.log import Log
+from svo.logs.log import Log
 
 SEED, SETTLE, SAMPLES = 20_261_128, 60, 160
 HORIZONS, COUNTS = (1, 2, 5, 10, 20, 50), (0, 1, 2, 3, 4, 5, 6)

@@ -24,10 +24,10 @@ from rich.table import Table
 from aircraft.eclipse.mismatch import measure_one
 from aircraft.eclipse.plant import Eclipse
 from aircraft.eclipse.scenarios import HEALTHY, Scenarios
-from svo.isolability import FaultFreeFlight
-from svo.log import Log
-from svo.model_pair import ModelPair
-from svo.plant_input import PlantInput, plant_input
+from svo.analysis.isolability import FaultFreeFlight
+from svo.analysis.model_pair import ModelPair
+from svo.analysis.plant_input import PlantInput, plant_input
+from svo.logs.log import Log
 
 Array = NDArray[np.float64]
 FAULT, OTHER, PROFILE = "elevator", "dynamics", "step"

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from svo.log_file import write_log
+from svo.detection.watch.follow import FileLines
+from svo.detection.watch.session import Session, Status
+from svo.detection.watch.view import view_of
+from svo.logs.file import write_log
 from svo.plant import load_plant
-from svo.watch.follow import FileLines
-from svo.watch.session import Session, Status
-from svo.watch.view import view_of
 
 PLANT, NOISE = "eclipse", "quiet"
 _WRITER = """

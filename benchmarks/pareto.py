@@ -19,8 +19,8 @@ from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER, Eclipse
 from benchmarks._observers import arguments, console, output_directions, save, table
 from polytopes import HPolytope
 from svo import ConstrainedZonotopeObserver, WindowObserver
-from svo.log import Log
-from svo.study.run import first_faulty_sample
+from svo.logs.log import Log
+from svo.studies.isolation.run import first_faulty_sample
 
 NOISE, SEED, HORIZONS, SETTLE = "quiet", 20_261_127, (1, 2, 5, 10, 20), 30
 WIDTH_EVERY = 10

@@ -20,7 +20,7 @@ from benchmarks._servo_detectors import gains_of_parts
 from benchmarks._servo_records import VARIABLE, data_folder
 from svo.interval import GainBounds, IntervalDetector, IntervalPredictor, NoiseCharacterization
 from svo.interval.identification import identify_first_order
-from svo.log import Log
+from svo.logs.log import Log
 
 Ts = 0.05
 LEARN = (10.0, 60.0)

@@ -20,7 +20,7 @@ from rich.progress import track
 from benchmarks._observers import OBSERVERS, arguments, console, linear_plant, save, table, window
 from polytopes import HPolytope
 from svo import ConstrainedZonotopeObserver, UncertainModel
-from svo.log import Log
+from svo.logs.log import Log
 
 SEED, SIZES, SAMPLES, FAULT_AT, FIRST_WIDTH = 20_261_129, (2, 4, 6, 8, 12, 16, 20), 50, 30, 10
 LARGEST_POLYTOPE = 4

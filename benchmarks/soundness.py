@@ -22,7 +22,7 @@ from rich.progress import track
 from benchmarks._observers import OBSERVERS, arguments, console, table
 from polytopes import HPolytope, UndecidedError
 from svo import UncertainModel
-from svo.log import Log
+from svo.logs.log import Log
 from tests.svo.observers.random_plants import random_plant
 
 SEED = 20_261_125

@@ -21,8 +21,8 @@ from rich.table import Table
 
 from aircraft.eclipse.plant import Eclipse
 from polytopes import HPolytope
-from svo.model import UncertainModel, Uncertainty
-from svo.observers.window import WindowObserver
+from svo.models.model import UncertainModel, Uncertainty
+from svo.observers.window.observer import WindowObserver
 
 STAGES = 10
 NOISE, SEED = "quiet", 20_130_613

@@ -1,26 +1,26 @@
 """Set-membership fault detection and isolation: uncertain models, set-valued observers, isolation banks.
 
 Sets are `polytopes.HPolytope`. Faults are in `svo.faults`, indices in `svo.indices`, the protocol of
-plants in `svo.plant`, studies in `svo.study`; the command line is ``svo --help``.
+plants in `svo.plant`, studies in `svo.studies.isolation`; the command line is ``svo --help``.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from svo.calibration import Calibration, calibrate
-    from svo.distinguish import Distinguishability, distinguishability
-    from svo.input_design import InputDesign, design_input
+    from svo.analysis.calibration import Calibration, calibrate
+    from svo.analysis.distinguish import Distinguishability, distinguishability
+    from svo.analysis.input_design import InputDesign, design_input
     from svo.isolation.architectures import ArchitectureI, ArchitectureII
     from svo.isolation.record import BankRecord, Verdict
-    from svo.log import Log
-    from svo.model import UncertainModel
-    from svo.observers.chain import ChainCheck, LateMeasurement, prove_chain
-    from svo.observers.polytope import PolytopeObserver
-    from svo.observers.window import WindowObserver
-    from svo.observers.zonotope import ConstrainedZonotopeObserver
-    from svo.schedule_table import ScheduleTable
-    from svo.uncertainty import Uncertainty
+    from svo.logs.log import Log
+    from svo.models.model import UncertainModel
+    from svo.models.schedule_table import ScheduleTable
+    from svo.models.uncertainty import Uncertainty
+    from svo.observers.polytope.observer import PolytopeObserver
+    from svo.observers.window.chain import ChainCheck, LateMeasurement, prove_chain
+    from svo.observers.window.observer import WindowObserver
+    from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
 
 __all__ = [
     "ArchitectureI",
@@ -49,23 +49,23 @@ _HOMES = {
     "ArchitectureI": "svo.isolation.architectures",
     "ArchitectureII": "svo.isolation.architectures",
     "BankRecord": "svo.isolation.record",
-    "Calibration": "svo.calibration",
-    "ChainCheck": "svo.observers.chain",
-    "ConstrainedZonotopeObserver": "svo.observers.zonotope",
-    "Distinguishability": "svo.distinguish",
-    "InputDesign": "svo.input_design",
-    "LateMeasurement": "svo.observers.chain",
-    "Log": "svo.log",
-    "PolytopeObserver": "svo.observers.polytope",
-    "ScheduleTable": "svo.schedule_table",
-    "UncertainModel": "svo.model",
-    "Uncertainty": "svo.uncertainty",
+    "Calibration": "svo.analysis.calibration",
+    "ChainCheck": "svo.observers.window.chain",
+    "ConstrainedZonotopeObserver": "svo.observers.zonotope.observer",
+    "Distinguishability": "svo.analysis.distinguish",
+    "InputDesign": "svo.analysis.input_design",
+    "LateMeasurement": "svo.observers.window.chain",
+    "Log": "svo.logs.log",
+    "PolytopeObserver": "svo.observers.polytope.observer",
+    "ScheduleTable": "svo.models.schedule_table",
+    "UncertainModel": "svo.models.model",
+    "Uncertainty": "svo.models.uncertainty",
     "Verdict": "svo.isolation.record",
-    "WindowObserver": "svo.observers.window",
-    "calibrate": "svo.calibration",
-    "design_input": "svo.input_design",
-    "distinguishability": "svo.distinguish",
-    "prove_chain": "svo.observers.chain",
+    "WindowObserver": "svo.observers.window.observer",
+    "calibrate": "svo.analysis.calibration",
+    "design_input": "svo.analysis.input_design",
+    "distinguishability": "svo.analysis.distinguish",
+    "prove_chain": "svo.observers.window.chain",
 }
 
 

@@ -1,7 +1,8 @@
-"""Checks of what a user hands over, on the one door for numbers (`polytopes.checks`)."""
+"""The ground: checks of what a user hands over, on the one door for numbers (`polytopes.checks`); optional packages."""
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -17,6 +18,7 @@ __all__ = [
     "floats",
     "is_count",
     "is_finite_number",
+    "optional_import",
     "positive_number",
     "readings",
     "real_array",
@@ -90,3 +92,20 @@ def check_noise(noise: Array, ny: int) -> None:
         raise ValueError(f"n has shape {noise.shape}; expected ({ny},), one half-width a sensor")
     if not np.isfinite(noise).all() or (noise < 0).any():
         raise ValueError(f"n is {noise}; expected finite half-widths >= 0")
+
+
+def optional_import(module: str, extra: str, what: str) -> Any:
+    """Import a module of a package that an extra of the distribution installs.
+
+    Raises
+    ------
+    ImportError
+        If it is not installed; the message says what needs it and how to get it.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = module.partition(".")[0]
+        raise ImportError(
+            f"{what} need {package}, which is not installed; install the extra: pip install 'svo-fdi[{extra}]'"
+        ) from error

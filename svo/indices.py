@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import real_array
-
-Array = NDArray[np.float64]
+from svo.checks import Array, real_array
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.noise import NoiseSet
 from aircraft.eclipse.simulator import Controller, Surrogate
 from aircraft.eclipse.trim import Trim, gust_directions, level_trim, output_matrix
-from svo.discretisation import zero_order_hold
-
-Array = NDArray[np.float64]
+from svo.checks import Array
+from svo.models.discretisation import zero_order_hold
 
 DESIGN_AIRSPEED = 37.0
 INPUT_LOWER = np.array([-25.0, 0.0])  # elevator [deg], thrust command

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 from polytopes import HPolytope
 from svo.baselines import GaussianModel
-from svo.comparison.detector import Detector
-from svo.comparison.residual_detectors import residual_test_detectors
-from svo.comparison.standard import standard_detectors
-from svo.comparison.window_bank import WindowBank
-from svo.model import UncertainModel
+from svo.detectors.detector import Detector
+from svo.detectors.residuals import residual_test_detectors
+from svo.detectors.standard import standard_detectors
+from svo.detectors.window_bank import WindowBank
+from svo.models.model import UncertainModel
 
 HORIZONS = (5, 20)  # steps in the windows of the set-valued observers whose bounds are scaled
 STATED_HORIZON = 10  # the bank of the studies, with its bounds as they are

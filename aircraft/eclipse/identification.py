@@ -8,14 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from aircraft.eclipse.derivatives import VALID_AIRSPEED, Derivatives
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import level_trim, linearise
-
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 AIRSPEEDS = np.linspace(*VALID_AIRSPEED, 13)  # every 2.5 m/s
 COEFFICIENTS = tuple(f.name for f in fields(Surrogate) if f.name != "normal_coupling")

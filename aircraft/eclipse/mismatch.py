@@ -13,14 +13,12 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from aircraft.eclipse.models import BOUNDS_FILE, NAMES, MismatchBounds
 from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.scenarios import FAULTS, HEALTHY, PROFILES, Run, Scenarios
+from svo.checks import Array
 from svo.faults import ActuatorFault, PlantFault
-
-Array = NDArray[np.float64]
 
 SPAWN_KEY = 0x0EC11953  # a study spawns its runs' seeds as 0, 1, 2, ...; this branch is never reached that way
 # A faulty flight's mismatch is mostly the manoeuvre, which repeats; a fault-free one's is all chance, quadratic in

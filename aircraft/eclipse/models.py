@@ -17,17 +17,15 @@ from functools import cached_property
 from importlib.resources import files
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.eclipse.derivatives import VALID_AIRSPEED, Derivatives
 from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.schedule import ScheduledBlocks
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import gust_directions, level_trim, output_matrix
-from svo.discretisation import zero_order_hold
-from svo.model import UncertainModel, Uncertainty
-
-Array = NDArray[np.float64]
+from svo.checks import Array
+from svo.models.discretisation import zero_order_hold
+from svo.models.model import UncertainModel, Uncertainty
 
 SPACING = 0.25  # of the table [m/s]; the interpolation error counts into the measured mismatch
 NAMES = {

@@ -27,11 +27,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.disturbances import BandLimitedNoise, Distribution
-
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 SENSOR_CUTOFF_HZ = 20.0
 GUST_CUTOFFS_HZ = (0.5, 1.0, 2.0)  # d_u, d_w, d_q

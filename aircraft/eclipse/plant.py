@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, INPUT_LOWER, INPUT_UPPER
 from aircraft.eclipse.models import MismatchBounds, ScheduledModel, read_bounds
@@ -17,19 +16,18 @@ from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
+from svo.checks import Array
 from svo.faults import SensorFault
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
-from svo.log import Log
-from svo.model import UncertainModel
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
+from svo.models.schedule_table import ScheduleTable
+from svo.observers.window.observer import WindowObserver
 from svo.plant import Column, Columns, Distribution, Reference, StatedFault
-from svo.schedule_table import ScheduleTable
 
 if TYPE_CHECKING:
-    from svo.comparison.detector import Detector
-
-Array = NDArray[np.float64]
+    from svo.detectors.detector import Detector
 
 REFERENCE: Mapping[tuple[str, str], Reference] = MappingProxyType(
     {

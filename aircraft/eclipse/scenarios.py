@@ -8,7 +8,7 @@ from functools import cache
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aircraft.disturbances import Distribution
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, design_autopilot
@@ -18,9 +18,9 @@ from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.simulator import Controller, Corruption, Flight, Surrogate, fly
 from aircraft.eclipse.trim import level_trim
+from svo.checks import Array
 from svo.faults import ActuatorFault, PlantFault, Profile, Ramp, SensorFault, Step
 
-Array = NDArray[np.float64]
 Fault = SensorFault | ActuatorFault | PlantFault
 
 TS = 0.01

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.schedule_table import ScheduleTable
-
-Array = NDArray[np.float64]
+from svo.checks import Array
+from svo.models.schedule_table import ScheduleTable
 
 FILTER_TIME_S = 0.5
 

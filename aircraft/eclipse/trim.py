@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root
 
 from aircraft.eclipse.derivatives import VALID_AIRSPEED
 from aircraft.eclipse.simulator import Surrogate
-
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from aircraft.elevator.scenarios import TRAVEL
 from polytopes import HPolytope
-from svo.comparison.detector import Detector
-from svo.comparison.interval import IntervalThreshold
-from svo.comparison.window_bank import WindowBank
+from svo.detectors.detector import Detector
+from svo.detectors.interval import IntervalThreshold
+from svo.detectors.window_bank import WindowBank
 from svo.interval import IntervalPredictor, first_order_model
 
 # Steps in the windows of the observers whose noise bound is tuned. With one state and gains that are free at each

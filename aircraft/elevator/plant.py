@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.elevator.gains import ServoGains
 from aircraft.elevator.scenarios import COMMANDS, DURATION, SCENARIOS, TRAVEL, TS, Scenario, SensorNoise
 from aircraft.elevator.servo import Servo
 from polytopes import HPolytope
-from svo.comparison.detector import Detector
+from svo.checks import Array
+from svo.detectors.detector import Detector
 from svo.faults import ActuatorFault
 from svo.interval import (
     FirstOrderScheduler,
@@ -25,12 +25,10 @@ from svo.interval import (
 )
 from svo.isolation.architectures import ArchitectureI
 from svo.isolation.bank import Bank
-from svo.log import Log
-from svo.model import UncertainModel
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
+from svo.observers.window.observer import WindowObserver
 from svo.plant import HEALTHY, Column, Columns, Distribution, Reference
-
-Array = NDArray[np.float64]
 
 POLES = (0.6, 0.8, 0.9, 0.95, 0.99)
 QBAR = 200

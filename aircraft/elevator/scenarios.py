@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
+from svo.checks import Array
 from svo.faults import ActuatorFault, Ramp, Step
-
-Array = NDArray[np.float64]
 
 TS = 0.01
 DURATION = 100.0

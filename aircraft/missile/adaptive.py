@@ -16,14 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aircraft.missile.airframe import Airframe
 from aircraft.missile.imu import SensorErrors
 from aircraft.missile.redundancy import DL, DM, DN, TRAVEL, ForceBalance
 from aircraft.missile.simulator import ACCELERATION, VELOCITY, dynamic_pressure, force_coefficients
-
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 
 @dataclass(frozen=True)

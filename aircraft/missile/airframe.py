@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 GRAVITY = 9.81
 DEFLECTION_LIMIT = float(np.radians(28.0))

@@ -6,23 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.missile.airframe import INPUTS, Airframe
 from aircraft.missile.models import measurement_of
 from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
 from polytopes import HPolytope
 from svo.baselines import GaussianModel
-from svo.comparison.detector import NOBODY, Detection, Detector, Parameter, Setting
-from svo.comparison.residual_detectors import residual_test_detectors
-from svo.comparison.standard import standard_detectors
-from svo.comparison.threshold import ThresholdDetector
-from svo.comparison.window_bank import WindowBank
-from svo.log import Log
-from svo.model import UncertainModel
+from svo.checks import Array
+from svo.detectors.detector import NOBODY, Detection, Detector, Parameter, Setting
+from svo.detectors.residuals import residual_test_detectors
+from svo.detectors.standard import standard_detectors
+from svo.detectors.threshold import ThresholdDetector
+from svo.detectors.window_bank import WindowBank
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 from svo.residual_tests.interface import above
 
-Array = NDArray[np.float64]
 HORIZONS = (5, 10)  # steps in the windows of the set-valued observers
 STATED_HORIZON = 10  # the bank of the studies, with its bounds as they are
 ACTUATORS = {"eta": "propulsion", "dm": "pitch_fin", "dn": "yaw_fin"}

@@ -12,9 +12,9 @@ from types import MappingProxyType
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from svo.checks import Array
+
 Distribution = Literal["uniform", "gaussian"]
 
 DELAY = 2

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from itertools import chain, combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aircraft.missile.airframe import INPUTS
 
-Array = NDArray[np.float64]
 FaultSet = tuple[str, ...]
 
 

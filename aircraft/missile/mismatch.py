@@ -12,14 +12,11 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
 from aircraft.missile.models import BOUNDS_FILE, Embedding, MismatchBounds, schedule_of
 from aircraft.missile.plant import ENDS, FAULTS, STARTS, fault_of
 from aircraft.missile.scenarios import TS, Fault, Flights, Run
-
-Array = NDArray[np.float64]
 
 SPAWN_KEY = 0x0EC11953  # a study spawns its runs' seeds as 0, 1, 2, ...; this branch is never reached that way
 MARGIN = 1.5

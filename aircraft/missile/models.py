@@ -23,14 +23,13 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aircraft.missile.airframe import INPUTS, Airframe
 from aircraft.missile.imu import SensorErrors
 from aircraft.missile.redundancy import ForceBalance
-from svo.model import UncertainModel
-
-Array = NDArray[np.float64]
+from svo.checks import Array
+from svo.models.model import UncertainModel
 
 BOUNDS_FILE = "bounds.toml"
 OUTPUTS = (9, 10, 11, 0, 1, 2)  # of the 15 measurements: velocity, acceleration

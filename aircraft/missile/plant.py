@@ -10,24 +10,22 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
 from aircraft.missile.models import OUTPUTS, SCHEDULING, Block, Embedding, MeasuredSchedule, read_bounds, schedule_of
 from aircraft.missile.scenarios import DM, DN, ETA, TS, Fault, Flights, locked, noise_set, thrust_loss
 from polytopes import HPolytope
+from svo.checks import Array
 from svo.faults import ActuatorFault, SensorFault, Step
 from svo.isolation.architectures import ArchitectureI
 from svo.isolation.bank import Bank
-from svo.log import Log
-from svo.model import UncertainModel
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
+from svo.observers.window.observer import WindowObserver
 from svo.plant import HEALTHY, Column, Columns, Distribution, Exhibit, Reference, StatedFault
 
 if TYPE_CHECKING:
-    from svo.comparison.detector import Detector
-
-Array = NDArray[np.float64]
+    from svo.detectors.detector import Detector
 
 STARTS, ENDS = 25.0, 40.0  # s of the flight that a log covers
 FAULT_TIME = 30.0

@@ -34,8 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aircraft.missile.airframe import INPUT_LOWER, INPUT_UPPER, INPUTS, Airframe
 from aircraft.missile.simulator import ACCELERATION, VELOCITY, dynamic_pressure, force_coefficients
-
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 DL, DM, DN, ETA = range(4)
 TRAVEL = np.maximum(np.abs(INPUT_LOWER), np.abs(INPUT_UPPER))

@@ -22,11 +22,11 @@ from aircraft.missile.isolability import isolability_table
 from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
 from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scenario, locked, noise_set, thrust_loss
 from aircraft.missile.sequence import isolate_in_order
+from svo.checks import Array
 from svo.store import Identity, Parts, versions, write_csv, write_text
 from svo.store import locked as alone_in
 from svo.store.tables import Json
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 MEAN_SAMPLES = 10

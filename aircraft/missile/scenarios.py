@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.missile.airframe import DEFLECTION_LIMIT, INPUT_LOWER, INPUT_UPPER, INPUTS, Airframe
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
 from aircraft.missile.simulator import Corruption, Flight, Guidance, fly
+from svo.checks import Array
 from svo.faults import ActuatorFault, SensorFault, Step
 
-Array = NDArray[np.float64]
 Fault = ActuatorFault | SensorFault
 
 TS = 0.01

@@ -19,8 +19,8 @@ from aircraft.missile.adaptive import ModelError
 from aircraft.missile.airframe import INPUTS, Airframe
 from aircraft.missile.isolability import diagnoses
 from aircraft.missile.redundancy import ETA, TABLE_1, ForceBalance, signature_matrix
+from svo.checks import Array
 
-Array = NDArray[np.float64]
 Kind = Literal["locking", "loss"]
 
 IDENTIFICATION_SAMPLES = 100

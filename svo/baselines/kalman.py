@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from svo.baselines.filter_kernel import filter_samples
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, Sample
-from svo.checks import finite_array, readings
-from svo.log import Log
+from svo.checks import Array, finite_array, readings
+from svo.logs.log import Log
 
-Array = NDArray[np.float64]
 _STABLE = 1e-9  # how far inside the unit circle a mode must be to count as stable
 _UNSEEN = 1e-9  # of |A|: singular value of a mode that the outputs do not see
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.log import Log
-from svo.model import UncertainModel
+from svo.checks import Array
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 
-Array = NDArray[np.float64]
 VARIANCE_OF_BOUND = 1.0 / 3.0  # of a uniform variable on [-1, 1]
 
 

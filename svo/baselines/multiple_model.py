@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from svo.baselines.filter_kernel import multiple_models
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
-from svo.log import Log
-
-Array = NDArray[np.float64]
+from svo.checks import Array
+from svo.logs.log import Log
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
-from svo.log import Log
+from svo.logs.log import Log
 
 Array = NDArray[np.float64]
 _TRACE = 1e-12  # of a squared norm

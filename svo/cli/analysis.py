@@ -35,8 +35,8 @@ def distinguish(
       svo distinguish eclipse --horizon 50 --noise quiet
     """
     with one_line_errors():
-        from svo.isolability import isolability
-        from svo.progress import progress
+        from svo.analysis.isolability import isolability
+        from svo.cli.progress import progress
 
         the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
@@ -79,7 +79,7 @@ def design_input(
       svo design-input eclipse --fault elevator --size 0.3 --horizon 10 --hold 5 --noise conservative
     """
     with one_line_errors():
-        from svo.plant_input import plant_input
+        from svo.analysis.plant_input import plant_input
 
         the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
@@ -139,9 +139,9 @@ def compare(
     with one_line_errors(KEPT):
         from dataclasses import replace
 
-        from svo.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
-        from svo.comparison.publish import publish_comparison, to_text
-        from svo.progress import progress
+        from svo.cli.progress import progress
+        from svo.studies.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
+        from svo.studies.comparison.publish import publish_comparison, to_text
 
         the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)

@@ -22,7 +22,7 @@ def writable_folder(path: Path | None) -> Path | None:
 
 def writable_log(path: Path | None) -> Path | None:
     """A log file in one of the known formats."""
-    from svo.log_file import check_suffix
+    from svo.logs.file import check_suffix
 
     if path is not None:
         with one_line_errors():

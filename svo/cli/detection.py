@@ -40,12 +40,12 @@ def detect(
       svo detect my.toml log.mat --out findings
     """
     with one_line_errors():
-        from svo.alarm_folder import check_no_results
-        from svo.description import check_kept_description, find_plant, keep_description
-        from svo.detect import detect as run_detection
-        from svo.detect import write_detection
+        from svo.cli.progress import progress
+        from svo.detection.alarm_folder import check_no_results
+        from svo.detection.detect import detect as run_detection
+        from svo.detection.detect import write_detection
         from svo.plant import DetectsThresholds, in_architecture
-        from svo.progress import progress
+        from svo.plant.description import check_kept_description, find_plant, keep_description
 
         if out is not None:
             check_no_results(out)
@@ -113,15 +113,15 @@ def watch(
     with one_line_errors(), ExitStack() as stack:
         from functools import partial
 
-        from svo.alarm_folder import watch_folder
         from svo.cli.output import console
-        from svo.description import check_kept_description, find_plant, keep_description
-        from svo.watch.follow import lines_of
-        from svo.watch.session import Session, identity_of
-        from svo.watch.silence import Silence
-        from svo.watch.state import resume_state, save_state
-        from svo.watch.view import view_of
-        from svo.watch.watch import watch as run_watch
+        from svo.detection.alarm_folder import watch_folder
+        from svo.detection.watch.follow import lines_of
+        from svo.detection.watch.session import Session, identity_of
+        from svo.detection.watch.silence import Silence
+        from svo.detection.watch.state import resume_state, save_state
+        from svo.detection.watch.view import view_of
+        from svo.detection.watch.watch import watch as run_watch
+        from svo.plant.description import check_kept_description, find_plant, keep_description
 
         the_plant = find_plant(plant)
         noise = chosen_noise(the_plant, noise)
@@ -166,8 +166,8 @@ def calibrate(
       svo calibrate eclipse log.csv --noise quiet
     """
     with one_line_errors():
-        from svo.description import find_plant
-        from svo.log_calibration import calibrate_log
+        from svo.detection.log_calibration import calibrate_log
+        from svo.plant.description import find_plant
 
         the_plant = find_plant(plant)
         noise = chosen_noise(the_plant, noise)

@@ -15,7 +15,7 @@ from svo.terminal import ReaderGoneError, line, safe_output
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from svo.log import Log
+    from svo.logs.log import Log
     from svo.plant import MonitoredPlant, Plant
 
 
@@ -63,7 +63,7 @@ def one_line_errors(interrupted: str = "interrupted") -> Iterator[None]:
 
 @contextmanager
 def _notes_in_lines() -> Iterator[None]:
-    from svo.log_columns import LogNote
+    from svo.logs.columns import LogNote
 
     with warnings.catch_warnings():
         others = warnings.showwarning
@@ -91,8 +91,8 @@ def fail(message: str, code: int = 1) -> None:
 
 def plant_to_simulate(name: str) -> Plant:
     """The registered plant of that name, for the commands that a description alone is not enough for."""
-    from svo.description.find import SUFFIX
     from svo.plant import load_plant, registered_plants
+    from svo.plant.description.find import SUFFIX
 
     if name.endswith(SUFFIX):
         raise ValueError(
@@ -108,7 +108,7 @@ def measured_log(path: Path, plant: MonitoredPlant) -> Log:
     """A log to judge a plant by: sensors that it never measured are noted, and one has to be there."""
     import numpy as np
 
-    from svo.log_file import read_log
+    from svo.logs.file import read_log
 
     log = read_log(path, plant.columns, plant.Ts)
     silent = [column.name for column, y in zip(plant.columns.outputs, log.y.T, strict=True) if np.isnan(y).all()]
@@ -124,7 +124,7 @@ def measured_log(path: Path, plant: MonitoredPlant) -> Log:
 
 def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:
     """The noise set that was named, or the plant's first."""
-    from svo.study.configuration import check_noise
+    from svo.studies.configuration import check_noise
 
     chosen = plant.noise_sets[0] if noise is None else noise
     check_noise(plant, chosen)

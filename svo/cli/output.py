@@ -14,12 +14,12 @@ from svo.terminal import line
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from svo.alarms import AlarmCheck
-    from svo.detect import Detection
-    from svo.interval.study.publish import DetectionStudy
-    from svo.isolability import Isolability
+    from svo.analysis.isolability import Isolability
+    from svo.detection.detect import Detection
+    from svo.isolation.alarms import AlarmCheck
     from svo.plant import Plant
-    from svo.study.summary import ConditionSummary
+    from svo.studies.isolation.summary import ConditionSummary
+    from svo.studies.thresholds.publish import DetectionStudy
 
 
 _SHOWN = 20  # failed checks
@@ -66,7 +66,7 @@ def print_json(value: Any) -> None:
 
 def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
     """Tables of a study, one a noise set, and what they count."""
-    from svo.study import tables
+    from svo.studies.isolation import tables
 
     screen = console()
     for noise in dict.fromkeys(s.noise for s in summaries):
@@ -81,7 +81,7 @@ def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
 
 def print_detector_study(found: DetectionStudy) -> None:
     """Tables of a study of interval detectors, and what came out."""
-    from svo.study.tables import to_rich
+    from svo.studies.isolation.tables import to_rich
 
     screen = console()
     for table in found.tables:

@@ -12,7 +12,7 @@ from svo.cli.options import AsJson
 from svo.cli.output import print_checks, print_json
 
 if TYPE_CHECKING:
-    from svo.alarms import AlarmCheck
+    from svo.isolation.alarms import AlarmCheck
 
 
 _WHY_EMPTY = "no model was falsified in what wrote it, or the file was cut off"
@@ -63,7 +63,7 @@ def verify(
 
 
 def _checks(path: Path, log: Path | None, full: Path | None) -> list[AlarmCheck]:
-    from svo.alarms import read_alarms, verify_alarms
+    from svo.isolation.alarms import read_alarms, verify_alarms
 
     if log is not None and full is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")
@@ -77,13 +77,13 @@ def _checks(path: Path, log: Path | None, full: Path | None) -> list[AlarmCheck]
         raise ValueError(
             f"{path} has alarms of several runs, and a log is that of one; give the alarms of that run alone"
         )
-    from svo.description import find_plant
-    from svo.log_file import read_log
+    from svo.logs.file import read_log
+    from svo.plant.description import find_plant
 
     # A description lies beside the alarms, where `svo detect` put it.
     plant = find_plant(str(alarms[0].source.get("plant")), path.parent)
     data = read_log(wanted, plant.columns, plant.Ts)
-    from svo.verification import PlantModels, verify_chains
+    from svo.detection.verification import PlantModels, verify_chains
 
     if full is None:
         return verify_alarms(path, data, PlantModels(plant, data).difference)

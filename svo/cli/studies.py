@@ -14,8 +14,8 @@ from svo.cli.options import AsJson, NoiseName, PlantName
 from svo.cli.output import describe, print_detector_study, print_json, print_study
 
 if TYPE_CHECKING:
-    from svo.interval.study import LearnsDetectors
-    from svo.study.configuration import StudyConfiguration
+    from svo.studies.configuration import StudyConfiguration
+    from svo.studies.thresholds import LearnsDetectors
 
 
 @app.command()
@@ -97,12 +97,12 @@ def study(
     """
     with one_line_errors(KEPT):
         _need_study_extra()
-        from svo.interval.study import LearnsDetectors
-        from svo.progress import progress
-        from svo.study.configuration import StudyConfiguration
-        from svo.study.publish import publish
-        from svo.study.runner import run_study, warm_up
-        from svo.study.store import StudyFolder
+        from svo.cli.progress import progress
+        from svo.studies.configuration import StudyConfiguration
+        from svo.studies.isolation.publish import publish
+        from svo.studies.isolation.runner import run_study, warm_up
+        from svo.studies.isolation.store import StudyFolder
+        from svo.studies.thresholds import LearnsDetectors
 
         the_plant = plant_to_simulate(plant)
         configuration = StudyConfiguration.for_plant(
@@ -120,7 +120,7 @@ def study(
         announce("Writing summary, pictures and report")
         summaries = publish(folder, the_plant)
         if as_json:
-            from svo.study.summary import to_json
+            from svo.studies.isolation.summary import to_json
 
             print_json({"configuration": configuration.to_dict(), "summary": to_json(summaries)})
         else:
@@ -148,11 +148,11 @@ def report(
     """
     with one_line_errors():
         _need_study_extra()
-        from svo.interval.study import LearnsDetectors
-        from svo.interval.study import publish as publish_detectors
         from svo.plant import load_plant
-        from svo.study.publish import publish
-        from svo.study.store import StudyFolder
+        from svo.studies.isolation.publish import publish
+        from svo.studies.isolation.store import StudyFolder
+        from svo.studies.thresholds import LearnsDetectors
+        from svo.studies.thresholds import publish as publish_detectors
 
         study = StudyFolder(folder)
         the_plant = load_plant(study.identity()["configuration"]["plant"])
@@ -185,9 +185,9 @@ def simulate(
       svo simulate eclipse --fault elevator --profile step --noise quiet --seed 0 --out log.csv
     """
     with one_line_errors():
-        from svo.log_file import write_log
+        from svo.logs.file import write_log
         from svo.plant import HEALTHY, fault_start
-        from svo.study.configuration import check_fault
+        from svo.studies.configuration import check_fault
 
         the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
@@ -216,8 +216,8 @@ def _study_detectors(
     resume: bool,
     as_json: bool,
 ) -> None:
-    from svo.interval.study import publish, run_detection_study
-    from svo.progress import progress
+    from svo.cli.progress import progress
+    from svo.studies.thresholds import publish, run_detection_study
 
     with progress("Runs") as update:
         folder = run_detection_study(

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.checks import finite_array, is_count, is_finite_number
+from svo.checks import Array, finite_array, is_count, is_finite_number
 from svo.faults.blocks import (
     channels,
     check_channels,
@@ -20,9 +20,8 @@ from svo.faults.blocks import (
     without_columns,
 )
 from svo.faults.profiles import EDGE_TOLERANCE_S, Profile, Step, at_times, check_profile
-from svo.model import UncertainModel, Uncertainty
+from svo.models.model import UncertainModel, Uncertainty
 
-Array = NDArray[np.float64]
 ActuatorKind = Literal[
     "loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid", "noise"
 ]

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.checks import finite_array, floats
-from svo.model import Schedulable, UncertainModel, Uncertainty
-from svo.schedule_table import ScheduleTable, values_over
-
-Array = NDArray[np.float64]
+from svo.checks import Array, finite_array, floats
+from svo.models.model import Schedulable, UncertainModel, Uncertainty
+from svo.models.schedule_table import ScheduleTable, values_over
 
 
 def mapped(function: Callable[..., Array], *values: Schedulable) -> Schedulable:

@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.checks import finite_array, is_finite_number
+from svo.checks import Array, finite_array, is_finite_number
 from svo.faults.profiles import Profile, check_profile
-from svo.model import UncertainModel, Uncertainty
-
-Array = NDArray[np.float64]
+from svo.models.model import UncertainModel, Uncertainty
 
 
 @dataclass(frozen=True)

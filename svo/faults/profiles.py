@@ -13,9 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import finite_array, is_finite_number, readings, real_array
-
-Array = NDArray[np.float64]
+from svo.checks import Array, finite_array, is_finite_number, readings, real_array
 
 EDGE_TOLERANCE_S = 1e-9
 

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.checks import is_finite_number
+from svo.checks import Array, is_finite_number
 from svo.faults.blocks import channels, check_channels, mapped, only_columns, only_rows, product_of, with_noise
 from svo.faults.profiles import Profile, at_times, check_profile
-from svo.model import Schedulable, UncertainModel, Uncertainty
+from svo.models.model import Schedulable, UncertainModel, Uncertainty
 
-Array = NDArray[np.float64]
 SensorKind = Literal["bias", "drift", "scaling", "hard"]
 
 

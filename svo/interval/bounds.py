@@ -8,11 +8,8 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from svo.checks import real_array
-
-Array = NDArray[np.float64]
+from svo.checks import Array, real_array
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import real_array
+from svo.checks import Array, real_array
 from svo.interval.bounds import GainBounds
 from svo.interval.noise import NoiseCharacterization
 from svo.interval.predictor import Interval, IntervalPrediction, IntervalPredictor
 from svo.interval.residual import check_pole, first_order_filter
-from svo.log import Log
-
-Array = NDArray[np.float64]
+from svo.logs.log import Log
 
 ThresholdVerdict = Literal["consistent", "exceeded"]
 """Of a statistical test. "exceeded" is an alarm, but no proof that the model is wrong: it rests on a noise that keeps

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from svo.checks import Array
 from svo.interval.bounds import GainBounds
-from svo.log import Log
-
-Array = NDArray[np.float64]
-
+from svo.logs.log import Log
 
 _SHORTEST = 0.01  # of a record, in time constants of the fit: nothing tells a longer one from no decay at all
 _BLOCKS = 8  # pieces over which the scores of the fit are summed for its standard errors

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from svo.checks import Array
 from svo.interval.predictor import IntervalPrediction, IntervalPredictor
-from svo.log import Log
-from svo.model import UncertainModel
-from svo.uncertainty import Uncertainty
-
-Array = NDArray[np.float64]
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
+from svo.models.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True)

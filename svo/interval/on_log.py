@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from svo.interval.detector import IntervalDetector, IntervalRecord
-from svo.log import Log
+from svo.logs.log import Log
 
 
 @dataclass(frozen=True, eq=False)

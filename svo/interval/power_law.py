@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.checks import finite_array
+from svo.checks import Array, finite_array
 from svo.interval.thresholds import checked_bounds
-
-Array = NDArray[np.float64]
 
 DEFAULT_EXPONENTS: tuple[float, ...] = tuple(np.round(np.arange(-2.0, 0.0, 0.05), 2).tolist())
 

@@ -14,15 +14,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from svo.checks import is_finite_number, real_number
+from svo.checks import Array, is_finite_number, real_number
 from svo.interval import kernel
 from svo.interval.bounds import GainBounds, GainLaw
 from svo.interval.residual import dead_zone
-from svo.log import Log
-
-Array = NDArray[np.float64]
+from svo.logs.log import Log
 
 
 class Interval(NamedTuple):

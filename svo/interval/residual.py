@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.checks import finite_array, is_finite_number, readings
-
-Array = NDArray[np.float64]
+from svo.checks import Array, finite_array, is_finite_number, readings
 
 
 def dead_zone(y: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Array:

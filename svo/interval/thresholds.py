@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.checks import real_array
+from svo.checks import Array, real_array
 from svo.interval.residual import check_pole
 
-Array = NDArray[np.float64]
 _EPS, _SMALLEST = float(np.finfo(float).eps), float(np.finfo(float).smallest_subnormal)
 
 

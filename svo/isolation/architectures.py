@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes import HPolytope
+from svo.checks import Array
 from svo.isolation.bank import Bank, Sample, falsified_and_undecided, largest_at
 from svo.isolation.bank_checks import by_name, check_counts
 from svo.isolation.bank_state import set_arrays, set_of
 from svo.isolation.global_logic import GlobalLogic
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
-from svo.observers.step import Observer, Step
+from svo.observers.base import Observer, Step
 
-Array = NDArray[np.float64]
 Box = tuple[Array, Array]
 
 

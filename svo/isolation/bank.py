@@ -19,8 +19,8 @@ from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import restore_state, saved_state
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Recorder, Verdict
-from svo.log import Log
-from svo.observers.step import Observer, Step
+from svo.logs.log import Log
+from svo.observers.base import Observer, Step
 
 
 @dataclass(frozen=True, slots=True)

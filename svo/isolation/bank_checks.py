@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from svo.isolation.logic import NOMINAL
-from svo.observers.step import Observer
+from svo.observers.base import Observer
 
 
 def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[str, ...]) -> dict[str, Observer]:

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.isolation.logic import LogicState, Tally
-from svo.model_digest import canonical
+from svo.models.digest import canonical
+from svo.observers.base import Observer
 from svo.observers.saved_state import digest_of_arrays
-from svo.observers.step import Observer
 
 if TYPE_CHECKING:
     from svo.isolation.bank import Bank

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.isolation.logic import GLOBAL, BankState
-from svo.observers.step import Step
+from svo.observers.base import Step
 
 
 @dataclass(frozen=True, slots=True)

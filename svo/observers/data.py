@@ -9,13 +9,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from svo.checks import finite_array, floats, real_number
-from svo.log import Log
-from svo.model import UncertainModel
-
-Array = NDArray[np.float64]
+from svo.checks import Array, finite_array, floats, real_number
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 
 
 def outputs_shaped(model: UncertainModel, y: ArrayLike) -> Array:

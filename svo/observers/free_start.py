@@ -19,7 +19,8 @@ import numpy as np
 from flint import arb, ctx
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from svo.checks import Array
+
 _BITS = 128
 _CONDITION = 1e10  # of O, weighted and scaled, up to which an inverse is worth trying
 

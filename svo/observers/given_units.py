@@ -9,17 +9,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes import Certificate, HPolytope
 from polytopes.exact import rational
-from svo.normal_form import NormalForm, lengthened, set_in
-from svo.observers.constrained_zonotope import ConstrainedZonotope
-from svo.observers.polytope_step import AnyCertificate, MeasuredOutput, PolytopeCertificate, PublishedCertificate
-from svo.observers.proof import ArrivalSet, WindowCertificate, WindowSample
-from svo.observers.zonotope_proof import ZonotopeCertificate
-
-Array = NDArray[np.float64]
+from svo.checks import Array
+from svo.models.normal_form import NormalForm, lengthened, set_in
+from svo.observers.polytope.step import (
+    AnyCertificate,
+    MeasuredOutput,
+    PolytopeCertificate,
+    PublishedCertificate,
+)
+from svo.observers.window.evidence import ArrivalSet, WindowCertificate, WindowSample
+from svo.observers.zonotope.certificate import ZonotopeCertificate
+from svo.observers.zonotope.zonotope import ConstrainedZonotope
 
 
 def set_out(P: HPolytope, unit: Array) -> HPolytope:

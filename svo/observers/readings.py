@@ -12,13 +12,11 @@ from itertools import dropwhile
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from svo.model import UncertainModel
+from svo.checks import Array
+from svo.models.model import UncertainModel
 from svo.observers.free_start import Reading, state_bounds
 from svo.observers.window_kernel import LARGEST
-
-Array = NDArray[np.float64]
 
 OUTGROWN = "outgrown"
 OUTSIDE = "outside the physical range"

@@ -1,6 +1,6 @@
 """States of observers that belong to one model: a seal of two digests, checked before anything is believed.
 
-``seal.model`` is the digest of the model and of the observer's options (`svo.model_digest`), with the matrices at the
+``seal.model`` is the digest of the model and of the observer's options (`svo.models.digest`), with the matrices at the
 model's typical schedule and at that of the last sample; ``seal.state`` is that of every array beside it. What a state
 concludes is not believed either: observers prove a falsification again.
 """
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.model import UncertainModel
-from svo.model_digest import ModelSample, Options, model_digest
+from svo.models.digest import ModelSample, Options, model_digest
+from svo.models.model import UncertainModel
 
 State = Mapping[str, NDArray[Any]]
 MODEL, WHOLE, SCHEDULE = "seal.model", "seal.state", "seal.schedule"

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import Array
 from svo.residual_tests.interface import Decision, ResidualTest, above, check_finite, check_positive
 from svo.residual_tests.run_length import LARGEST_DRIFT, LARGEST_THRESHOLD, log_run_length
 
-Array = NDArray[np.float64]
 _LARGEST = float(np.log(np.finfo(float).max))
 
 

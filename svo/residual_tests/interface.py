@@ -9,9 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import is_finite_number, readings, real_array
-
-Array = NDArray[np.float64]
+from svo.checks import Array, is_finite_number, readings, real_array
 
 
 class Decision(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from svo.checks import Array
 from svo.residual_tests.interface import (
     Decision,
     ResidualTest,
@@ -18,8 +19,6 @@ from svo.residual_tests.interface import (
     check_probability,
     row_sums,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

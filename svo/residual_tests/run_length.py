@@ -11,11 +11,10 @@ of integral equations whose every number is of ordinary size.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 from scipy.special import erfcx
 
-Array = NDArray[np.float64]
+from svo.checks import Array
 
 LARGEST_DRIFT, LARGEST_THRESHOLD = 40.0, 1e4  # k and h up to which the equations are solved
 _PANEL, _NODES = 2.0, 12  # a Gaussian times a smooth function, integrated to 1e-15

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t
 
+from svo.checks import Array
 from svo.residual_tests.interface import WindowTest, check_count, check_finite, check_probability, row_sums
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

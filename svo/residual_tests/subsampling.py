@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import Array
 from svo.residual_tests.interface import WindowTest, check_count, check_finite
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import norm
 
-from svo.checks import finite_array, readings
+from svo.checks import Array, finite_array, readings
 from svo.residual_tests.interface import (
     DecisionRecord,
     WindowTest,
@@ -17,7 +17,6 @@ from svo.residual_tests.interface import (
     check_positive,
 )
 
-Array = NDArray[np.float64]
 _ROUNDING = 1e-12
 
 

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
-from svo.checks import finite_array
+from svo.checks import Array, finite_array
 from svo.residual_tests.interface import check_count, check_finite, check_positive
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

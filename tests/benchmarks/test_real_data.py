@@ -15,7 +15,7 @@ from benchmarks.real_flight import LEARN, angle, between, failure_time, main
 from benchmarks.real_servo import FAULTS, INSTANTS, pole_at
 from svo.cli import app
 from svo.interval import IntervalDetector
-from svo.log import Log
+from svo.logs.log import Log
 
 FOLDER = data_folder()
 SERVO = Path(__file__).parents[2] / "docs" / "examples" / "servo.toml"

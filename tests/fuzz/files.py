@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from svo.description import read_description
-from svo.detect import detect
-from svo.log import Log
-from svo.log_file import read_log
-from svo.model_file import read_arrays
+from svo.detection.detect import detect
+from svo.logs.file import read_log
+from svo.logs.log import Log
+from svo.models.mat import read_arrays
+from svo.plant.description import read_description
 from tests.fuzz.bytes_of import damaged
 from tests.fuzz.outcome import ROOT, WrongError
 

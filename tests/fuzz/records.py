@@ -13,20 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from svo.alarms import Alarm, read_alarms, verify_alarms, write_alarms
-from svo.description import read_description
-from svo.detect import detect
+from svo.detection.detect import detect
+from svo.detection.verification import PlantModels
+from svo.isolation.alarms import Alarm, read_alarms, verify_alarms, write_alarms
 from svo.isolation.bank import Bank
-from svo.log import Log
-from svo.log_file import read_log
-from svo.study.configuration import StudyConfiguration
-from svo.study.runner import run_study
-from svo.study.store import StudyFolder
-from svo.verification import PlantModels
+from svo.logs.file import read_log
+from svo.logs.log import Log
+from svo.plant.description import read_description
+from svo.studies.configuration import StudyConfiguration
+from svo.studies.isolation.runner import run_study
+from svo.studies.isolation.store import StudyFolder
 from tests.fuzz.bytes_of import damaged
 from tests.fuzz.files import CART
 from tests.fuzz.outcome import WrongError
-from tests.svo.study.registered.tank_plant import Tank
+from tests.svo.studies.isolation.registered.tank_plant import Tank
 
 NUMBERS = [0, -1, 1.5, 10**30, 10**4000, True, None, "", "0", "0x1p+0", "nan", "inf", [], {}, "9" * 4000]
 

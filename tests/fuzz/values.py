@@ -16,7 +16,7 @@ from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.faults import ActuatorFault, PlantFault, Ramp, SensorFault, Step
 from svo.indices import detection_indices
 from svo.interval import IntervalPredictor, NoiseCharacterization
-from svo.log import Log
+from svo.logs.log import Log
 from svo.residual_tests import CUSUM, GLR, SPRT, StaticThreshold, StudentT
 from tests.fuzz.outcome import WrongError
 

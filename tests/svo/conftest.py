@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-REGISTERED = Path(__file__).parent / "study" / "registered"
+REGISTERED = Path(__file__).parent / "studies" / "isolation" / "registered"
 
 
 @pytest.fixture

@@ -21,9 +21,9 @@ from numba.core.errors import TypingError
 import svo
 from polytopes import HPolytope
 from svo import ArchitectureI, PolytopeObserver, UncertainModel, WindowObserver
-from svo.alarms import Alarm
-from svo.log import Log
-from tests.svo.study.test_runner import configuration
+from svo.isolation.alarms import Alarm
+from svo.logs.log import Log
+from tests.svo.studies.isolation.test_runner import configuration
 
 FAILED = pytest.fail.Exception  # of pytest.raises
 
@@ -47,7 +47,7 @@ def cart_observer() -> WindowObserver:
 
 @later("A11", AssertionError, "a run that alarmed before its fault counts as detected in the elevator's study")
 def test_an_alarm_before_the_fault_is_no_detection() -> None:
-    from svo.interval.study.run import _judge
+    from svo.studies.thresholds.run import _judge
 
     alarm = np.zeros(40, dtype=bool)
     alarm[10:] = True  # before the fault at sample 20, and never gone
@@ -59,7 +59,7 @@ def test_an_alarm_before_the_fault_is_no_detection() -> None:
 
 @later("B1", AttributeError, "an alarm of a polytope observer ends the watch that shows it")
 def test_a_watch_shows_the_alarm_of_a_polytope_observer() -> None:
-    from svo.watch.view import alarm_text
+    from svo.detection.watch.view import alarm_text
 
     observer = PolytopeObserver(cart(), HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
     observer.update([0.0])
@@ -71,7 +71,7 @@ def test_a_watch_shows_the_alarm_of_a_polytope_observer() -> None:
 def test_a_study_goes_on_after_a_failing_run(
     registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from svo.study.runner import run_study
+    from svo.studies.isolation.runner import run_study
 
     monkeypatch.setenv("TANK_BURSTS", "1")
     assert run_study(configuration(registered_tank, runs=1), tmp_path / "out").rows() is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from svo.normal_form import ENORMOUS
+from svo.models.normal_form import ENORMOUS
 from svo.observers.window_kernel.channels import bound_channels, open_channel
 from svo.observers.window_kernel.factors import factor_sample
 from svo.observers.window_kernel.memory import LARGEST, PENDING, STARTED, TIME, UNDECIDED

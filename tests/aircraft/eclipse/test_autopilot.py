@@ -9,7 +9,7 @@ from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.scenarios import TS
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import level_trim, linearise, output_matrix
-from svo.discretisation import zero_order_hold
+from svo.models.discretisation import zero_order_hold
 
 
 def _closed_loop(c, A, B, C):

@@ -6,8 +6,8 @@ import pytest
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.mismatch import measure_one
 from aircraft.eclipse.plant import eclipse
-from svo.isolability import FaultFreeFlight
-from svo.model_pair import ModelPair
+from svo.analysis.isolability import FaultFreeFlight
+from svo.analysis.model_pair import ModelPair
 
 PLANT, NOISE, SAMPLES = eclipse(), "quiet", 3
 

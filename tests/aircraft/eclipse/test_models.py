@@ -12,7 +12,7 @@ from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.scenarios import FAULTS, HEALTHY, LARGEST, PROFILES, TS, Scenarios, corrupt
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import level_trim
-from svo.discretisation import zero_order_hold
+from svo.models.discretisation import zero_order_hold
 
 SCENARIOS = Scenarios()
 FLIGHTS = [(HEALTHY, ""), *((fault, profile) for fault in FAULTS for profile in PROFILES)]

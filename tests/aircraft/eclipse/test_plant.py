@@ -8,7 +8,7 @@ from aircraft.eclipse.scenarios import Scenarios
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
-from svo.detect import verdicts
+from svo.detection.detect import verdicts
 from svo.isolation.architectures import ArchitectureII
 from svo.plant import Plant, architecture_of, in_architecture, load_plant
 

@@ -7,9 +7,9 @@ import pytest
 
 from aircraft.elevator.plant import POLES, TABLE_1, elevator
 from svo import WindowObserver
-from svo.comparison.detector import Detector, Setting
-from svo.interval.study import LearnsDetectors
+from svo.detectors.detector import Detector, Setting
 from svo.plant import ComparesDetectors, InputScheduler, Plant, TimesFaults, fault_start, load_plant, schedule_of
+from svo.studies.thresholds import LearnsDetectors
 
 PLANT = elevator()
 QUIET, CONSERVATIVE = "quiet", "conservative"

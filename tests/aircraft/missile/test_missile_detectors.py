@@ -5,7 +5,7 @@ import pytest
 
 from aircraft.missile.detectors import Redundancy
 from aircraft.missile.plant import missile
-from svo.comparison.detector import Detector, Setting
+from svo.detectors.detector import Detector, Setting
 from svo.plant import ComparesDetectors
 
 PLANT = missile()

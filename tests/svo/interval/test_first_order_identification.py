@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from svo.interval.identification import identify_first_order
-from svo.log import Log
+from svo.logs.log import Log
 
 
 def run_of(g: float, h: float, samples: int, seed: int, noise: float = 0.0) -> Log:

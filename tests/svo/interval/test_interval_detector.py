@@ -16,7 +16,7 @@ from svo.interval import (
     NoiseCharacterization,
     ThresholdVerdict,
 )
-from svo.observers.step import VerdictName
+from svo.observers.base import VerdictName
 
 BOUNDS = GainBounds(0.8, 0.05)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.isolation.bank import Bank
-from svo.log import Log
+from svo.logs.log import Log
 
 
 @dataclass

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from svo.faults import ActuatorFault, PlantFault, SensorFault
-from svo.log import Log
-from svo.model import UncertainModel, Uncertainty
+from svo.logs.log import Log
+from svo.models.model import UncertainModel, Uncertainty
 
 SAMPLES, TS, START = 40, 0.1, 1.0
 

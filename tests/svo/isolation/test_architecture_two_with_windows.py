@@ -14,9 +14,9 @@ from small_plant import SAMPLES, START, faults_of, fly, plant
 from polytopes import HPolytope
 from svo.faults import ActuatorFault, Intermittent, SensorFault, Step
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
-from svo.log import Log
-from svo.model import UncertainModel
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
+from svo.observers.window.observer import WindowObserver
 
 HARD_OVER = 2.0
 AT_DETECTION = round(START / 0.1)

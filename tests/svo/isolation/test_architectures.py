@@ -10,7 +10,7 @@ from fake_observers import FakeModel, FakeObserver, FakeStep, fake, log_of
 
 from polytopes import HPolytope
 from svo.isolation.architectures import ArchitectureI
-from svo.log import Log
+from svo.logs.log import Log
 
 NOTHING = np.array([])
 

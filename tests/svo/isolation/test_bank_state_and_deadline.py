@@ -15,7 +15,7 @@ from svo import ArchitectureI, ArchitectureII, WindowObserver
 from svo.faults import ActuatorFault, FaultPair, Intermittent, SensorFault, Step, pairs
 from svo.isolation.bank import Bank
 from svo.isolation.record import Verdict
-from svo.log import Log
+from svo.logs.log import Log
 from tests.svo.isolation.fake_observers import FakeObserver
 from tests.svo.isolation.small_plant import START, TS, faults_of, fly, plant
 

@@ -15,8 +15,8 @@ from svo import ArchitectureI, ArchitectureII, ConstrainedZonotopeObserver, Wind
 from svo.faults import Ramp, Step
 from svo.isolation.bank import Bank
 from svo.isolation.record import Verdict
-from svo.log import Log
-from svo.model import UncertainModel
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 
 few = settings(max_examples=10, deadline=None)
 DELAY = 2

@@ -14,9 +14,9 @@ from small_plant import SAMPLES, START, TS, faults_of, fly, plant
 from polytopes import HPolytope
 from svo.faults import Intermittent, Ramp, Step
 from svo.isolation.architectures import ArchitectureI
-from svo.log import Log
-from svo.model import UncertainModel
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
+from svo.observers.window.observer import WindowObserver
 
 few = settings(max_examples=15, deadline=None)
 

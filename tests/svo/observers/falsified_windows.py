@@ -11,9 +11,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from polytopes import HPolytope
-from svo.model import UncertainModel, Uncertainty
-from svo.observers.proof import ArrivalSet, WindowCertificate
-from svo.observers.window import WindowObserver
+from svo.models.model import UncertainModel, Uncertainty
+from svo.observers.window.evidence import ArrivalSet, WindowCertificate
+from svo.observers.window.observer import WindowObserver
 from tests.svo.observers.random_plants import random_plant
 
 SAMPLES, FAULT = 16, 7

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from svo.log import Log
-from svo.model import UncertainModel
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 
 Array = NDArray[np.float64]
 Signs = tuple[int, ...]

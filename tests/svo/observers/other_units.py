@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.log import Log
-from svo.model import UncertainModel
+from svo.logs.log import Log
+from svo.models.model import UncertainModel
 
 Array = NDArray[np.float64]
 SIZES = {"x": "n_states", "u": "n_inputs", "y": "n_outputs", "w": "n_disturbances"}

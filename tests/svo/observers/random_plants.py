@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from polytopes import HPolytope
-from svo.model import UncertainModel, Uncertainty
+from svo.models.model import UncertainModel, Uncertainty
 
 
 def random_uncertainty(rng: np.random.Generator, n: int, nu: int, nw: int, ny: int) -> Uncertainty:

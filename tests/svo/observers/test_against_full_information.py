@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polytopes import HPolytope
-from svo.log import Log
-from svo.model import UncertainModel, Uncertainty
-from svo.observers.window import WindowObserver
+from svo.logs.log import Log
+from svo.models.model import UncertainModel, Uncertainty
+from svo.observers.window.observer import WindowObserver
 from tests.svo.observers import oracle
 
 SAMPLES = 7

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 
 from polytopes import HPolytope
-from svo.model import UncertainModel, Uncertainty
-from svo.observers.left_out import factors_of
-from svo.observers.proof import WindowCertificate
-from svo.observers.window import WindowObserver
+from svo.models.model import UncertainModel, Uncertainty
+from svo.observers.window.evidence import WindowCertificate
+from svo.observers.window.left_out import factors_of
+from svo.observers.window.observer import WindowObserver
 from tests.svo.observers.falsified_windows import (
     arrays_of,
     certificate_of_jump,

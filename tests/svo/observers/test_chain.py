@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import LateMeasurement, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver, prove_chain
-from svo.log import Log
+from svo.logs.log import Log
 from tests.svo.observers.random_plants import random_plant
 
 
@@ -37,7 +37,7 @@ def test_every_bound_of_a_random_plant_is_proven(seed: int) -> None:
 
 def test_a_bound_that_is_too_tight_is_not_proven(monkeypatch: pytest.MonkeyPatch) -> None:
     """Falsify the arrival sets by hand: the chain must notice, though every window proof still verifies."""
-    from svo.observers.chain import ProvingObserver
+    from svo.observers.window.chain import ProvingObserver
 
     model = UncertainModel([[0.9]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.1])
     rng = np.random.default_rng(0)

@@ -9,7 +9,7 @@ import pytest
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver, prove_chain
-from svo.log import Log
+from svo.logs.log import Log
 from tests.svo.observers.gap_plants import after_a_gap, answers, blind, rotation, start, unstable
 
 HORIZONS = (1, 3, 10, None)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
-from svo.log import Log
-from svo.observers.chain import LateMeasurement, prove_chain
+from svo.logs.log import Log
+from svo.observers.window.chain import LateMeasurement, prove_chain
 from tests.svo.observers.random_plants import random_plant
 from tests.svo.observers.window_system import judge
 

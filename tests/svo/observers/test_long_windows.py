@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from polytopes.exact import rational
 from svo import UncertainModel, WindowObserver
-from svo.log import Log
+from svo.logs.log import Log
 from svo.observers.window_kernel import rounding
 from tests.svo.observers.random_plants import random_plant
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
-from svo.normal_form import NormalForm
-from svo.observers.polytope import PolytopeObserver
-from svo.observers.proof import WindowCertificate, WindowSample
-from svo.observers.zonotope import ConstrainedZonotopeObserver
+from svo.models.normal_form import NormalForm
+from svo.observers.polytope.observer import PolytopeObserver
+from svo.observers.window.evidence import WindowCertificate, WindowSample
+from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
 from tests.svo.observers.falsified_windows import corrupted, varied_plant
 from tests.svo.observers.other_units import Units
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from polytopes import HPolytope
-from svo.log import Log
-from svo.model import UncertainModel, Uncertainty
+from svo.logs.log import Log
+from svo.models.model import UncertainModel, Uncertainty
 from tests.svo.observers.oracle import FullInformation, box, margin, prefix
 
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver, calibrate, distinguishability
-from svo.observers.left_out import factors_of
+from svo.observers.window.left_out import factors_of
 from svo.observers.window_kernel import channel_count, channel_factors
-from svo.observers.zonotope import ConstrainedZonotopeObserver
+from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
 from tests.svo.observers.other_units import Units
 from tests.svo.observers.random_plants import random_plant
 from tests.svo.observers.test_normal_form import hydraulics, same

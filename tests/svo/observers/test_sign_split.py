@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver
-from svo.alarms import Alarm, verify_alarms, write_alarms
-from svo.detect import alarms_of
-from svo.log import Log
-from svo.observers.sign_split import SplitCertificate
-from svo.verification import verify_chains
+from svo.detection.detect import alarms_of
+from svo.detection.verification import verify_chains
+from svo.isolation.alarms import Alarm, verify_alarms, write_alarms
+from svo.logs.log import Log
+from svo.observers.window.sign_split import SplitCertificate
 from tests.svo.observers import oracle
 from tests.svo.observers.random_plants import random_plant
 from tests.svo.observers.test_against_full_information import (

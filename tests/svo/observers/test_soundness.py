@@ -12,7 +12,7 @@ from scipy.linalg import solve_discrete_are
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
-from svo.log import Log
+from svo.logs.log import Log
 from tests.svo.observers.random_plants import random_plant
 
 seeds = st.integers(0, 2**32 - 1)

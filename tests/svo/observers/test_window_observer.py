@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
-from svo.log import Log
+from svo.logs.log import Log
 from svo.observers import window_kernel as kernel
 from tests.svo.observers.random_plants import random_plant
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from polytopes.exact import rational, rational_vector
 from svo import ConstrainedZonotopeObserver, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
-from svo.observers.constrained_zonotope import ConstrainedZonotope
-from svo.observers.zonotope_program import ZonotopeProgram
-from svo.observers.zonotope_reduction import reduced, rescaled
+from svo.observers.zonotope.program import ZonotopeProgram
+from svo.observers.zonotope.reduction import reduced, rescaled
+from svo.observers.zonotope.zonotope import ConstrainedZonotope
 from tests.svo.observers.random_plants import random_plant
 from tests.svo.observers.test_soundness import random_initial, scalar_counterexample
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from svo.observers.left_out import factors_of
-from svo.observers.proof import WindowCertificate, WindowSample
+from svo.observers.window.evidence import WindowCertificate, WindowSample
+from svo.observers.window.left_out import factors_of
 
 Array = NDArray[np.float64]
 Row = dict[int, Fraction]

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svo.comparison.residual_detectors import SPRTDetector
-from svo.comparison.standard import window_sums
+from svo.detectors.residuals import SPRTDetector
+from svo.detectors.standard import window_sums
 from svo.residual_tests import CUSUM, GLR, SPRT, ChiSquare, RandomizedSubsampling, StaticThreshold, StudentT, Whitening
 
 TESTS = [

@@ -1,0 +1,109 @@
+"""Whether a plant can hide behind another model: the smallest number of samples after which it cannot.
+
+The question is directed: a plant, with a fault of a stated size, against the model of an observer. Both may use any
+first state, disturbance, noise and Delta within their bounds. If no choice gives both the same outputs over N
+samples, the observer is falsified within these N samples, whatever happens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from polytopes import HPolytope
+from svo.analysis.model_pair import ModelPair, PairSolution, Witness
+from svo.models.model import UncertainModel
+
+
+@dataclass(frozen=True)
+class Distinguishability:
+    """Answer of `distinguishability`.
+
+    Attributes
+    ----------
+    horizon : int or None
+        Smallest number of samples N that no common output covers: the observer is falsified at the latest by the
+        N-th sample. None if there is no such N up to ``searched``.
+    searched : int
+        Largest number of samples that was asked for.
+    separation : float
+        How much wider the noise of both would have to be, relative to the sum of their bounds, to give common outputs
+        over ``horizon`` (or ``searched``) samples. Proven from below by weak duality.
+    exact : bool
+        Whether no product Delta s was relaxed. If one was, ``horizon`` is still valid but perhaps not the smallest, and
+        None says only that none was found.
+    witness : Witness or None
+        The longest common output that was found: over horizon - 1, or ``searched`` samples. None if there is none (the
+        first sample separates), or if it belongs to the relaxed program only.
+    """
+
+    horizon: int | None
+    searched: int
+    separation: float
+    exact: bool
+    witness: Witness | None
+
+
+def distinguishability(
+    plant_model: UncertainModel,
+    observer_model: UncertainModel,
+    horizon: int,
+    *,
+    initial: HPolytope,
+    observer_initial: HPolytope | None = None,
+    u: ArrayLike | HPolytope | None = None,
+    schedule: ArrayLike | None = None,
+) -> Distinguishability:
+    """The smallest number of samples within which an observer of one model is always falsified by another plant.
+
+    Each number of samples is one sparse linear program: the least widening of both noises that gives a common output.
+    It is exact without uncertainties, and where s of every product Delta s (s = f'(x, u, 1, w)) is known or keeps one
+    sign over a reachable set that needs no measurements; elsewhere the product is relaxed to its convex hull, and so
+    are uncertainties of higher rank than one. Then the answer is sufficient only, which `Distinguishability.exact`
+    tells. The number found is valid for an observer that keeps all data since the first sample
+    (``WindowObserver(..., horizon=None)``); one with a window keeps less.
+
+    Parameters
+    ----------
+    plant_model : UncertainModel
+        The plant, with its fault at a stated size; it should not contain the fault-free plant.
+    observer_model : UncertainModel
+        What the observer assumes; as many inputs and outputs as the plant.
+    horizon : int
+        Largest number of samples N >= 1 to search.
+    initial : HPolytope
+        Bounded set of the plant's states at the first sample.
+    observer_initial : HPolytope, optional
+        The same for the observer's model; ``initial`` by default.
+    u : (K, nu) array or HPolytope
+        The inputs of K >= horizon samples, or a bounded set that each input lies in; then the answer holds for every
+        sequence out of it. May be left out for models without inputs.
+    schedule : (K, ...) array, optional
+        Scheduling value of each sample; needed if an array of a model is a function of it.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For models that do not belong together, and for a wrong or missing argument.
+    RuntimeError
+        If the solver leaves a program undecided.
+    """
+    pair = ModelPair(plant_model, observer_model, horizon, initial, observer_initial or initial, u, schedule)
+    below, above = 0, 1
+    answers: dict[int, PairSolution] = {}
+    while True:  # doubling, then bisection: feasibility can only be lost as samples are added
+        answers[above] = pair.solve(above)
+        if answers[above].separated or above == horizon:
+            break
+        below, above = above, min(2 * above, horizon)
+    if not answers[above].separated:
+        last = answers[above]
+        return Distinguishability(None, horizon, last.separation, last.exact, last.witness())
+    while above - below > 1:
+        middle = (below + above) // 2
+        answers[middle] = pair.solve(middle)
+        below, above = (below, middle) if answers[middle].separated else (middle, above)
+    exact = answers[above].exact and (below == 0 or answers[below].exact)
+    witness = answers[below].witness() if below else None
+    return Distinguishability(above, horizon, answers[above].separation, exact, witness)

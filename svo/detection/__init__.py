@@ -1,0 +1,1 @@
+"""A bank over recorded or live data: detection, verification of its alarms, the watch."""

@@ -1,0 +1,140 @@
+"""Who may write alarms into a folder: nothing overwrites, joins or deletes an alarm file that it did not write itself.
+
+- ``svo detect`` writes into a folder without results, once.
+- ``svo watch`` does too, and leaves ``watch.json`` there, which says whose alarms these are: started again for the same
+  log, plant and noise set it adds to them.
+- ``svo study`` joins what its own runs wrote, known by its SHA-256 (`svo.store.joined`).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from svo.isolation.alarms import Alarm, alarm_line
+from svo.store import locked, write_text
+
+ALARMS = "alarms.jsonl"
+VERDICT = "verdict.json"
+_WATCH = "watch.json"
+_CUT = "alarms.cut"
+_RESULTS = (ALARMS, VERDICT, _WATCH, "study.json", "comparison.csv")
+_FORMAT = "svo-watch-1"
+
+
+def check_no_results(folder: Path) -> None:
+    """Raise a ValueError if a folder holds what a command wrote, or a link in the place of that."""
+    found = [name for name in _RESULTS if os.path.lexists(folder / name)]
+    if found:
+        raise ValueError(
+            f"{folder} holds results already ({', '.join(found)}), and these are never overwritten; "
+            "give another folder, or move them away first"
+        )
+
+
+class WatchFolder:
+    """The alarms of one watch: those of before are kept when it is started again; `watch_folder` opens one.
+
+    A record that stands there already, because its sample was read again, is not added a second time.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.alarms = folder / ALARMS
+        self.before = 0
+        self.notes: list[str] = []
+        self._known: set[str] = set()
+        if self.alarms.exists():
+            self._set_cut_end_aside()
+            self._known = set(self.alarms.read_text(encoding="utf-8", errors="replace").splitlines())
+            self.before = len(self._known)
+        else:
+            self.alarms.touch()
+
+    def add(self, alarm: Alarm) -> None:
+        """Store an alarm; it is on the disk when this returns, and a failure leaves the file as it was."""
+        record = alarm_line(alarm)
+        if record.rstrip("\n") in self._known:
+            return
+        with self.alarms.open("ab") as file:
+            size = os.fstat(file.fileno()).st_size
+            try:
+                file.write(record.encode())
+                file.flush()
+                os.fsync(file.fileno())
+            except OSError:
+                with suppress(OSError):  # a full disk may have taken half of it
+                    os.truncate(self.alarms, size)
+                raise
+        self._known.add(record.rstrip("\n"))
+
+    def _set_cut_end_aside(self) -> None:
+        """A record without its end, as a loss of power leaves it, would make the next one unreadable."""
+        content = self.alarms.read_bytes()
+        end = content.rfind(b"\n") + 1
+        if end < len(content):
+            cut = self.alarms.with_name(_CUT)
+            with cut.open("ab") as file:
+                file.write(content[end:] + b"\n")
+                file.flush()
+                os.fsync(file.fileno())
+            os.truncate(self.alarms, end)
+            self.notes.append(f"the last record of {self.alarms} was cut when it was written; it is now in {cut}")
+
+
+@contextmanager
+def watch_folder(folder: Path, identity: Mapping[str, str]) -> Iterator[WatchFolder]:
+    """Open the folder of a watch, for one process at a time.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if need be.
+    identity : mapping
+        Plant, noise set and log: what the watch that wrote the folder must have been about.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds results of another command, or of a watch of something else; or another process is
+        writing into it.
+    """
+    about = {"format": _FORMAT, **identity}
+    _check_own(folder, about)
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        _check_own(folder, about)
+        if not (folder / _WATCH).exists():
+            write_text(folder / _WATCH, json.dumps(about, indent=2) + "\n")
+        yield WatchFolder(folder)
+
+
+def _check_own(folder: Path, about: Mapping[str, str]) -> None:
+    """Raise a ValueError unless a folder has no results, or those of a watch of the same."""
+    path = folder / _WATCH
+    if not os.path.lexists(path):
+        check_no_results(folder)
+        return
+    for name in (_WATCH, ALARMS):
+        if (folder / name).is_symlink():
+            raise ValueError(f"{folder / name} is a symbolic link; expected a file of the watch itself, so remove it")
+    try:
+        stored = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        stored = None
+    if not isinstance(stored, dict) or stored.get("format") != _FORMAT:
+        raise ValueError(f"{path} is not that of a watch (format {_FORMAT}); give another folder")
+    different = differences(stored, about)
+    if different:
+        raise ValueError(f"{folder} holds the alarms of another watch ({different}); give another folder")
+
+
+def differences(stored: Mapping[str, str], now: Mapping[str, str]) -> str:
+    """What differs between what is stored and what is now; empty if nothing does."""
+    return "; ".join(
+        f"{key} was {stored.get(key)!r}, now {now.get(key)!r}"
+        for key in dict.fromkeys((*stored, *now))
+        if stored.get(key) != now.get(key)
+    )

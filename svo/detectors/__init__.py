@@ -1,0 +1,1 @@
+"""Every detector behind one protocol, to be set side by side."""

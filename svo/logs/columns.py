@@ -1,0 +1,162 @@
+"""What the columns of a log must be, whatever holds them: a CSV, Parquet or MAT file, a data frame.
+
+- The columns of time, inputs and outputs must be there, under the plant's names and in its units; their
+  order is free. State columns are read if all are there. Any other column is ignored.
+- NaN (or an empty cell, or null) in an output means that this sensor is missing at that sample; in a state, that
+  it is unknown. In time and inputs it is an error, and so is Inf anywhere.
+- Time increases by the model's sampling time, within 1 % of it, from row to row. A sample that was lost
+  must stand in the log as a row whose sensor cells are empty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.checks import Array
+from svo.logs.log import Log
+
+if TYPE_CHECKING:
+    from svo.logs.names import Column, Columns
+
+Place = Callable[[int], str]
+
+# Relative: a step is taken for Ts if |step - Ts| <= 0.01 Ts. The model then reckons with Ts: what the difference does
+# to the plant is for the user's bounds to hold, no set is widened by it.
+TIME_TOLERANCE = 0.01
+
+
+class LogNote(UserWarning):
+    """Something in a log that was read in a way its reader should know of; the command line prints it as a note."""
+
+
+def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> list[str]:
+    """Names of the columns to read: time, inputs, outputs and, if all are there, the states.
+
+    Raises
+    ------
+    ValueError
+        If one that is needed is missing, or is there more than once.
+    """
+    needed = [columns.time, *(c.name for c in columns.inputs + columns.outputs)]
+    missing = [name for name in needed if name not in present]
+    if missing:
+        raise ValueError(
+            f"{source} has no column {', '.join(repr(name) for name in missing)}; "
+            f"expected the columns {', '.join(needed)}, found {', '.join(map(str, present))}"
+            + _meant(missing[0], [str(name) for name in present if name not in needed])
+        )
+    states = [c.name for c in columns.states]
+    wanted = needed + (states if all(name in present for name in states) else [])
+    twice = sorted({name for name in wanted if list(present).count(name) > 1})
+    if twice:
+        raise ValueError(f"{source} has more than one column {twice[0]!r}; rename or drop all but one")
+    return wanted
+
+
+def _meant(missing: str, others: Sequence[str]) -> str:
+    """The column that may stand there under another spelling, or with its unit."""
+    bare = {name.partition("[")[0].partition("(")[0].strip().lower(): name for name in others}
+    close = get_close_matches(missing.lower(), bare, n=1)
+    return f". Is {bare[close[0]]!r} meant? Then rename it to {missing!r}" if close else ""
+
+
+def may_be_missing(columns: Columns) -> frozenset[str]:
+    """Columns in which NaN has a meaning."""
+    return frozenset(c.name for c in columns.outputs + columns.states)
+
+
+def not_finite(where: str, cell: object) -> ValueError:
+    hint = "; write a decimal point" if isinstance(cell, str) and "," in cell else ""
+    return ValueError(f"{where}: {cell!r} is not a finite number{hint}")
+
+
+def not_there(where: str) -> ValueError:
+    return ValueError(
+        f"{where}: the cell is empty or NaN; only sensor columns may be missing, "
+        "so fill the value in or drop the rows from here on"
+    )
+
+
+def log_of_columns(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float) -> Log:
+    """A log from whole columns of numbers, (K,) each, of which `wanted_columns` are there.
+
+    Raises
+    ------
+    ValueError
+        Naming the source, the sample and the column.
+    """
+    unknown = may_be_missing(columns)
+    for name, values in cells.items():
+        bad = np.isinf(values) | (np.isnan(values) & (name not in unknown))
+        for k in np.flatnonzero(bad)[:1]:
+            where = f"{source}, sample {k}, column {name!r}"
+            raise not_there(where) if np.isnan(values[k]) else not_finite(where, float(values[k]))
+    return assemble(source, cells, columns, Ts, lambda k: f"sample {k}")
+
+
+def assemble(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float, place: Place) -> Log:
+    """A log from columns whose cells have been checked; ``place`` says where in the source a sample stands."""
+    time = cells[columns.time]
+    if not len(time):
+        raise ValueError(f"{source} has a header but no samples; expected one row a sample")
+    check_times(time, Ts, lambda k: f"{source}, {place(k)}, column {columns.time!r}")
+    y, u, x = (_stack(cells, group, len(time)) for group in (columns.outputs, columns.inputs, columns.states))
+    return Log(time=time, u=u, y=y, x=x if columns.states and columns.states[0].name in cells else None)
+
+
+def check_times(time: Array, Ts: float, place: Place) -> None:
+    """Raise a ValueError unless time goes by the sampling time; ``place`` says where a sample stands."""
+    for k in np.flatnonzero(~_is_sampled(np.diff(time), Ts))[:1]:
+        raise wrong_step(place(int(k) + 1), time[k], time[k + 1], Ts)
+
+
+def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError:
+    """Why time may not go so from one row to the next."""
+    step = f"{where}: time goes from {before:.9g} s to {after:.9g} s"
+    if after <= before:
+        return ValueError(f"{step}; expected increasing times, so sort the rows and drop doubles")
+    found = f"{step}, a step of {after - before:.6g} s; expected the model's sampling time {Ts:.6g} s. "
+    for unit, seconds in (("milliseconds", 1e-3), ("microseconds", 1e-6)):
+        if is_sampled(before * seconds, after * seconds, Ts):
+            return ValueError(f"{found}The column seems to be in {unit}; divide it by {1 / seconds:g}")
+    return ValueError(f"{found}Resample the log; a lost sample is a row with empty sensor cells")
+
+
+def is_sampled(before: float, after: float, Ts: float) -> bool:
+    """Whether a row follows another by one sampling time."""
+    return bool(_is_sampled(np.array(after - before), Ts))
+
+
+def columns_of_log(log: Log, columns: Columns) -> dict[str, Array]:
+    """The columns of a log by name: time, inputs, outputs and, if it has them, true states.
+
+    Raises
+    ------
+    ValueError
+        If the log has another number of channels than there are columns.
+    """
+    groups = [("u", log.u, columns.inputs), ("y", log.y, columns.outputs)]
+    if log.x is not None:
+        groups.append(("x", log.x, columns.states))
+    cells = {columns.time: log.time}
+    for name, values, group in groups:
+        if values.shape[1] != len(group):
+            raise ValueError(
+                f"{name} of the log has {values.shape[1]} channels; expected {len(group)}, one a column of the plant"
+            )
+        cells |= {c.name: values[:, i] for i, c in enumerate(group)}
+    return cells
+
+
+def _is_sampled(steps: Array, Ts: float) -> NDArray[np.bool_]:
+    return np.abs(steps - Ts) <= TIME_TOLERANCE * Ts
+
+
+def _stack(cells: Mapping[str, Array], group: Sequence[Column], rows: int) -> Array:
+    present = [cells[c.name] for c in group if c.name in cells]
+    return np.column_stack(present) if present else np.zeros((rows, 0))

@@ -1,0 +1,91 @@
+"""Logs as files; the suffix says what the file is: .csv (text), .parquet (pyarrow) or .mat (MATLAB).
+
+The rules for the columns are those of `svo.logs.columns`. In each format floats read back to the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from svo.checks import is_finite_number
+from svo.logs.columns import columns_of_log
+from svo.logs.csv import read_csv, write_csv
+from svo.logs.log import Log
+from svo.logs.mat import read_mat_log, write_mat
+from svo.logs.parquet import read_parquet, write_parquet
+
+if TYPE_CHECKING:
+    from svo.logs.names import Columns
+
+
+class _Format(NamedTuple):
+    read: Callable[[Path, Columns, float], Log]
+    write: Callable[..., None]
+
+
+_FORMATS = {
+    ".csv": _Format(read_csv, write_csv),
+    ".parquet": _Format(read_parquet, write_parquet),
+    ".mat": _Format(read_mat_log, write_mat),
+}
+
+
+def write_log(path: str | Path, log: Log, columns: Columns) -> None:
+    """Write a log with its true states, if it has them.
+
+    Raises
+    ------
+    ValueError
+        If the log has another number of channels than there are columns, or the suffix is not known.
+    ImportError
+        If the format needs a package that is not installed.
+    """
+    path = Path(path)
+    _format(path).write(path, columns_of_log(log, columns))
+
+
+def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
+    """Read a log under the rules of `svo.logs.columns`.
+
+    Parameters
+    ----------
+    path : path of a .csv, .parquet or .mat file
+    columns : Columns
+        Names of the columns, in the model's order.
+    Ts : float
+        The model's sampling time [s].
+
+    Returns
+    -------
+    Log
+        Without a schedule: the plant's scheduler makes it from y, sample by sample.
+
+    Raises
+    ------
+    ValueError
+        Naming the file, the line or sample and the column, with what was found and what was expected.
+    OSError
+        If the file cannot be opened.
+    ImportError
+        If the format needs a package that is not installed.
+    """
+    path = Path(path)
+    if not (is_finite_number(Ts) and Ts > 0):
+        raise ValueError(f"Ts is {Ts!r}; expected a positive sampling time in seconds")
+    if path.is_dir():
+        raise ValueError(f"{path} is a folder; expected a log file, one of {', '.join(_FORMATS)}")
+    return _format(path).read(path, columns, Ts)
+
+
+def check_suffix(path: str | Path) -> None:
+    """Raise a ValueError if the suffix is not that of a log file."""
+    _format(Path(path))
+
+
+def _format(path: Path) -> _Format:
+    found = _FORMATS.get(path.suffix.lower())
+    if found is None:
+        raise ValueError(f"{path} has the suffix {path.suffix!r}; expected one of {', '.join(_FORMATS)}")
+    return found

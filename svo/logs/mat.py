@@ -1,0 +1,59 @@
+"""Logs as MAT files up to version 7.2: one vector a channel, all of one length.
+
+Other variables, such as the scalars of a test's settings, are ignored.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from svo.logs.columns import Array, log_of_columns, wanted_columns
+from svo.logs.log import Log
+from svo.logs.mat_file import MatFile
+
+if TYPE_CHECKING:
+    from svo.logs.names import Columns
+
+_VARIABLE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
+
+
+def write_mat(path: Path, cells: Mapping[str, Array]) -> None:
+    """Write columns (K,) as column vectors.
+
+    Raises
+    ------
+    ValueError
+        If a column's name is not one that a MAT file can hold.
+    """
+    from scipy.io import savemat
+
+    for name in cells:
+        if not _VARIABLE.fullmatch(name):
+            raise ValueError(
+                f"column {name!r} cannot be a variable of a MAT file; expected a letter, then at most 30 letters, "
+                "digits and underscores"
+            )
+    savemat(path, {name: values[:, None] for name, values in cells.items()}, appendmat=False)
+
+
+def read_mat_log(path: Path, columns: Columns, Ts: float) -> Log:
+    """Read a log; errors name the sample and the variable."""
+    file = MatFile.open(path)
+    needed = (columns.time, *(c.name for c in columns.inputs + columns.outputs))
+    for name, kind in file.kinds.items():
+        if name in needed and kind != "numbers":
+            raise ValueError(f"{path} has no column {name!r} of numbers; the variable of that name is {kind}")
+    names = wanted_columns(str(path), file.numeric, columns)
+    variables = file.read(names)
+    samples = variables[columns.time].size
+    for name in names:
+        shape = variables[name].shape
+        if variables[name].size != samples or samples not in shape:
+            raise ValueError(
+                f"{path}, variable {name!r} has shape {shape}; expected a vector of {samples} samples, as "
+                f"{columns.time!r} has"
+            )
+    return log_of_columns(str(path), {name: variables[name].ravel() for name in names}, columns, Ts)

@@ -1,0 +1,1 @@
+"""Uncertain linear parameter-varying models: construction, discretisation, normal form, simulation."""

@@ -1,0 +1,1 @@
+"""The observer that keeps an H-polytope."""

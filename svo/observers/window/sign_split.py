@@ -1,0 +1,223 @@
+"""Programs of a window split by the signs of its channels' s, where the convex hull of p = Delta s is not exact.
+
+For s in [l, r] with l < 0 < r the hull of {(s, Delta s)} holds points that no Delta explains. Each of the cells s >= 0
+and s <= 0 is exact, so the maximum over both is that of the true, nonconvex set. Cells are split best first, only
+where the maximiser of a program needs a p that is no Delta s; every bound so far is an outer one, so the search may
+stop at any number of cells.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from svo.checks import Array
+from svo.observers import window_kernel as kernel
+from svo.observers.window.evidence import ArrivalSet, WindowCertificate, WindowSample
+
+Cell = dict[tuple[int, int], tuple[float, float]]  # (sample, channel): bounds of its s
+_CHANGED = ("G", "GT", "row_x", "row_v", "row_c", "raw_lower", "raw_upper", "scale", "magnitude", "lower", "upper",
+            "s_lower", "s_upper", "lines")  # fmt: skip
+_INEXACT = 1e-9  # of the half-width of p, by which p may miss Delta s
+
+
+@dataclass(frozen=True, eq=False)
+class SplitCertificate:
+    """Proof that a window is empty whatever the signs of its s: one certificate a cell, and the cells cover all.
+
+    Attributes
+    ----------
+    cells : tuple of WindowCertificate
+        The same window and data, with bounds of s that differ.
+    s_lower, s_upper : (samples, nq) arrays
+        Bounds of every s that the cells must cover; conditional as in `WindowCertificate`.
+    """
+
+    cells: tuple[WindowCertificate, ...]
+    s_lower: Array
+    s_upper: Array
+
+    @property
+    def first(self) -> int:
+        return self.cells[0].first
+
+    @property
+    def last(self) -> int:
+        return self.cells[0].last
+
+    @property
+    def n(self) -> int:
+        return self.cells[0].n
+
+    @property
+    def samples(self) -> tuple[WindowSample, ...]:
+        """Model and data of the window; bounds of s and multipliers are those of the first cell."""
+        return self.cells[0].samples
+
+    def verify(self) -> bool:
+        """Check every cell in exact arithmetic, that all have the same data, and that none is missing."""
+        if not self.cells or not all(cell.verify() for cell in self.cells):
+            return False
+        if not all(_same_window(self.cells[0], cell) for cell in self.cells[1:]):
+            return False
+        boxes = [(np.array([s.s_lower for s in c.samples]), np.array([s.s_upper for s in c.samples]))
+                 for c in self.cells]  # fmt: skip
+        shape = boxes[0][0].shape
+        if self.s_lower.shape != shape or self.s_upper.shape != shape:
+            return False
+        return _cover(self.s_lower, self.s_upper, boxes)
+
+
+def _same_window(a: WindowCertificate, b: WindowCertificate) -> bool:
+    own = ("first", "last", "n", "late", "largest_at", "delta", "owner", "w_rows", "w_rows_lower", "w_rows_upper")
+    data = ("stack", "u", "y", "noise", "slack", "w_lower", "w_upper")
+    pairs = [(getattr(a, name), getattr(b, name)) for name in own]
+    pairs += [(getattr(a.arrival, name), getattr(b.arrival, name)) for name in ArrivalSet.__dataclass_fields__]
+    pairs += [(getattr(s, d), getattr(t, d)) for s, t in zip(a.samples, b.samples, strict=True) for d in data]
+    return all(np.array_equal(p, q, equal_nan=np.asarray(p).dtype.kind == "f") for p, q in pairs)
+
+
+def _cover(lower: Array, upper: Array, boxes: list[tuple[Array, Array]]) -> bool:
+    """Whether boxes cover lower <= s <= upper, by halving it where one of them ends inside."""
+    if any((low <= lower).all() and (upper <= high).all() for low, high in boxes):
+        return True
+    for low, high in boxes:
+        for ends in (low, high):
+            inside = np.argwhere((lower < ends) & (ends < upper))
+            if len(inside):
+                at = tuple(inside[0])
+                below, above = upper.copy(), lower.copy()
+                below[at] = above[at] = ends[at]
+                parts = ((lower, below), (above, upper))
+                return all(_cover(*part, [b for b in boxes if _meet(*part, *b)]) for part in parts)
+    return False
+
+
+def _meet(lower: Array, upper: Array, low: Array, high: Array) -> bool:
+    """Whether two boxes share a point; touching is enough."""
+    return bool((np.maximum(lower, low) <= np.minimum(upper, high)).all())
+
+
+@dataclass(frozen=True)
+class SplitResult:
+    """Maximum over the cells, whether one of them surely has a point, and the proof if none has (then -inf)."""
+
+    value: float
+    has_point: bool
+    proof: SplitCertificate | None
+
+
+class SplitPrograms:
+    """The programs of a window whose cells are told apart; restores the window's rows when it is left.
+
+    Parameters
+    ----------
+    arrays, window, size
+        Of the kernel.
+    certificate : callable
+        The certificate of the window as it stands.
+    limit : int
+        Largest number of cells that a program may have.
+    """
+
+    def __init__(
+        self,
+        arrays: dict[str, Any],
+        window: Any,
+        size: kernel.Sizes,
+        certificate: Callable[[], WindowCertificate],
+        limit: int,
+    ) -> None:
+        self._w, self._window, self._size, self._certificate, self._limit = arrays, window, size, certificate, limit
+        self._open = dict(self._open_channels())
+        self._saved = {name: arrays[name].copy() for name in _CHANGED}
+        base, time = int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME])
+        slots = [k % (size.N + size.late) for k in range(base, time + 1)]
+        self._bounds = arrays["s_lower"][slots].copy(), arrays["s_upper"][slots].copy()
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether any s in the window may have either sign."""
+        return bool(self._open)
+
+    def solve(self, task: int, program: int, bound: Callable[[], float]) -> SplitResult:
+        """One program over the cells; ``bound`` reads the upper bound that the kernel found."""
+        count, has_point, proofs = 0, False, []
+        heap: list[tuple[float, int, Cell, tuple[int, int] | None]] = []
+        waiting: list[Cell] = [{}]
+        while waiting:
+            for cell in waiting:
+                verdict, value, branch = self._one(task, program, cell, bound)
+                count += 1
+                has_point = has_point or verdict == kernel.CONSISTENT
+                if verdict == kernel.EMPTY_CANDIDATE:
+                    proof = self._certificate()
+                    if proof.verify():
+                        proofs.append(proof)
+                        continue
+                heapq.heappush(heap, (-value, count, cell, branch))
+            waiting = []
+            if heap and heap[0][3] is not None and count < self._limit:
+                _, _, cell, (k, q) = heapq.heappop(heap)  # type: ignore[misc]
+                low, high = self._open[k, q]
+                waiting = [cell | {(k, q): (low, 0.0)}, cell | {(k, q): (0.0, high)}]
+        self._apply({})
+        self._w["seen_base"][:] = -1
+        if heap:
+            return SplitResult(-heap[0][0], has_point, None)
+        return SplitResult(-np.inf, False, SplitCertificate(tuple(proofs), *self._bounds))
+
+    def _one(
+        self, task: int, program: int, cell: Cell, bound: Callable[[], float]
+    ) -> tuple[int, float, tuple[int, int] | None]:
+        self._apply(cell)
+        self._w["seen_base"][:] = -1  # the bases are those of other rows
+        verdict, _ = kernel.solve(self._window, self._size, task, program, program + 1, kernel.PIVOT_LIMIT)
+        branch = self._most_violated(cell) if verdict == kernel.CONSISTENT else self._widest(cell)
+        return verdict, bound(), branch
+
+    def _apply(self, cell: Cell) -> None:
+        for name, array in self._saved.items():
+            self._w[name][...] = array
+        for (k, q), (low, high) in cell.items():
+            kernel.redraw_channel(self._window, self._size, k, q, low, high)
+
+    def _open_channels(self) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
+        w, size = self._w, self._size
+        nr = size.ny + size.nh + 2 * size.nq
+        for k in range(int(w["clock"][kernel.BASE]), int(w["clock"][kernel.TIME]) + size.late):
+            v = k % (size.N + size.late)
+            rows = w["scale"][size.na + (k % (size.N + 1)) * nr + size.ny + size.nh :]
+            for q in range(size.nq):
+                low, high = float(w["s_lower"][v, q]), float(w["s_upper"][v, q])
+                if low < 0.0 < high and rows[2 * q] != 0.0 and w["delta"][q, 0] < w["delta"][q, 1]:
+                    yield (k, q), (low, high)
+
+    def _widest(self, cell: Cell) -> tuple[int, int] | None:
+        """The channel left open whose p is the least certain."""
+        left = {at: min(-low, high) for at, (low, high) in self._open.items() if at not in cell}
+        return max(left, key=left.__getitem__) if left else None
+
+    def _most_violated(self, cell: Cell) -> tuple[int, int] | None:
+        """The open channel whose p at the maximiser misses every Delta s the most; None if none does."""
+        w, size = self._w, self._size
+        n, nw, nv, z = size.n, size.nw, size.nw + size.nq, self._w["z"]
+        x, worst, found = w["xc"] + w["xr"] * z[:n], _INEXACT, None
+        for k in range(int(w["clock"][kernel.BASE]), int(w["clock"][kernel.TIME]) + 1):
+            s, v = k % (size.N + 1), k % (size.N + size.late)
+            own = z[n + v * nv : n + (v + 1) * nv]
+            values = w["vc"][v] + w["vr"][v] * own
+            for q in range(size.nq):
+                if (k, q) in self._open and (k, q) not in cell:
+                    value = float(w["functional"][v, q] @ np.concatenate([x, w["u"][s], [1.0], values[:nw]]))
+                    low, high = sorted(d * value for d in w["delta"][q])
+                    p, width = float(values[nw + q]), float(w["vr"][v, nw + q])
+                    miss = max(low - p, p - high) / width if width > 0.0 else 0.0
+                    if miss > worst:
+                        worst, found = miss, (k, q)
+            x = w["A"][s] @ x + w["drift"][s] + w["inputs"][s] @ own
+        return found

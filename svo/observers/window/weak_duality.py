@@ -1,0 +1,197 @@
+"""Weak duality over a window, in exact rational arithmetic.
+
+Every float is a rational number, so the window's rows, written with the states as variables, are the model's own
+numbers. Given multipliers of the data rows, the multipliers of the state equations follow by the backward
+recursion
+
+    pi_k = A_k' pi_(k+1) + C_k' lambda_k + (channel rows),
+
+and the window is empty if the multiplied rows exceed their bounds at every point of the variables' boxes. With a
+direction at one sample subtracted, the same sum bounds that direction over the window.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from flint import fmpq
+
+from svo.checks import Array
+from svo.observers.window.left_out import Factors, factors_of, left_out
+
+if TYPE_CHECKING:
+    from svo.observers.window.evidence import WindowCertificate, WindowSample
+
+ZERO = fmpq(0)
+
+
+def exact(value: float) -> fmpq:
+    """The rational number that a finite float is."""
+    return fmpq(*float(value).as_integer_ratio())
+
+
+def _interval_min(coefficient: fmpq, lower: fmpq, upper: fmpq) -> fmpq:
+    return coefficient * (lower if coefficient > 0 else upper)
+
+
+class NoProof(Exception):
+    """Something in a certificate does not support its claim."""
+
+
+class DualSum:
+    """One exact evaluation of a certificate whose arrays have been checked.
+
+    Raises
+    ------
+    NoProof
+        From `gap`, where a multiplier, a line or a factor is not what the rows need.
+    """
+
+    def __init__(self, certificate: WindowCertificate, objective: tuple[int, Array] | None = None) -> None:
+        self.c = certificate
+        self.objective = objective  # sample of the window and direction of what is subtracted from the rows
+        self.total = ZERO  # lower bound of (multiplied rows - multiplied bounds) over the boxes
+
+    def gap(self) -> fmpq:
+        """Least value of the multiplied rows minus their bounds; positive proves emptiness."""
+        c = self.c
+        costate = [ZERO] * c.n
+        factors = self._factors()
+        rest = left_out(c, factors) if any(of.rest for of in factors) else None
+        for index in range(len(c.samples) - 1, -1, -1):
+            newest = index == len(c.samples) - 1
+            costate = self._sample(c.samples[index], costate, newest, factors[index], rest[index] if rest else [])
+            if self.objective is not None and self.objective[0] == index:
+                costate = [p - exact(d) for p, d in zip(costate, self.objective[1], strict=True)]
+        for r, multiplier in enumerate(c.on_arrival):
+            if multiplier:
+                m = exact(multiplier)
+                self._bound(m, c.arrival.lower[r], c.arrival.upper[r])
+                costate = [p + m * exact(a) for p, a in zip(costate, c.arrival.rows[r], strict=True)]
+        for p, low, high in zip(costate, c.arrival.box_lower, c.arrival.box_upper, strict=True):
+            if p:
+                self._box(p, low, high)
+        return self.total
+
+    def _factors(self) -> list[Factors]:
+        """Of every sample; they add up to the uncertainties with what they leave out."""
+        known: dict[bytes, Factors | None] = {}
+        found = []
+        for s in self.c.samples:
+            key = s.stack[1:].tobytes()
+            if key not in known:
+                known[key] = factors_of(s.stack, self.c.owner, self.c.delta, self.c.units)
+            of = known[key]
+            if of is None:
+                raise NoProof
+            found.append(of)
+        return found
+
+    def _bound(self, multiplier: fmpq, lower: float, upper: float) -> None:
+        bound = upper if multiplier > 0 else lower
+        if not np.isfinite(bound):
+            raise NoProof
+        self.total -= multiplier * exact(bound)
+
+    def _box(self, coefficient: fmpq, lower: float, upper: float) -> None:
+        self.total += _interval_min(coefficient, exact(lower), exact(upper))
+
+    def _sample(self, s: WindowSample, after: list[fmpq], newest: bool, of: Factors, rest: list[fmpq]) -> list[fmpq]:
+        """Account for one sample; ``after`` is the costate of the next state, the result that of this one."""
+        n, ny, nu = self.c.n, s.y.size, s.u.size
+        active = not newest or self.c.late
+        # weight of every row of the stack: the next state's costate, then the output multipliers
+        weight = list(after) + [ZERO] * ny
+        for o, multiplier in enumerate(s.on_output):
+            if multiplier:
+                weight[n + o] = self._output(s, o, exact(multiplier))
+        known: list[fmpq] = [ZERO] * s.stack.shape[2]
+        self._combine(known, s.stack[0], weight)
+        if active:
+            self._channels(s, weight, known, of)
+            self.total -= sum((abs(w) * r for w, r in zip(weight, rest, strict=False)), ZERO)
+            self._disturbance(s, known[n + nu + 1 :])
+        elif any(known[n + nu + 1 :]) or np.any(s.stack[1:, n:]) or np.any(s.on_channel) or np.any(s.on_w):
+            raise NoProof
+        for value, coefficient in zip(s.u, known[n : n + nu], strict=True):
+            if coefficient:
+                self.total += coefficient * exact(value)
+        self.total += known[n + nu]
+        return known[:n]
+
+    def _output(self, s: WindowSample, o: int, m: fmpq) -> fmpq:
+        if not np.isfinite(s.y[o]):
+            raise NoProof
+        reach = exact(s.noise[o]) + exact(s.slack[o])
+        self.total -= m * (exact(s.y[o]) + (reach if m > 0 else -reach))
+        return m
+
+    @staticmethod
+    def _combine(target: list[fmpq], matrix: Array, weight: list[fmpq]) -> None:
+        """target += weight' matrix, over the nonzero entries."""
+        for i, w in enumerate(weight):
+            if w:
+                for j in np.flatnonzero(matrix[i]):
+                    target[j] += w * exact(matrix[i, j])
+
+    def _channels(self, s: WindowSample, weight: list[fmpq], known: list[fmpq], of: Factors) -> None:
+        """Add each channel's p: its box, its two lines over s = functional'(x, u, 1, w), and its effect."""
+        for q, (gain, functional) in enumerate(zip(of.gains, of.functionals, strict=True)):
+            lo, hi = (exact(v) for v in self.c.delta[q])
+            low, high = exact(s.s_lower[q]), exact(s.s_upper[q])
+            on_p = sum((w * exact(g) for w, g in zip(weight, gain, strict=True) if w and g), ZERO)
+            on_s = ZERO
+            for side in range(2):
+                multiplier = s.on_channel[q, side]
+                if multiplier:
+                    m, slope, intercept = (
+                        exact(multiplier),
+                        exact(s.lines[q, 2 * side]),
+                        exact(s.lines[q, 2 * side + 1]),
+                    )
+                    self._check_line(1 - 2 * side, slope, intercept, (lo, hi), (low, high))
+                    if m < 0:
+                        raise NoProof
+                    sign = 1 - 2 * side
+                    on_p += sign * m
+                    on_s -= sign * m * slope
+                    self.total -= sign * m * intercept
+            if on_s:
+                for j in np.flatnonzero(functional):
+                    known[j] += on_s * exact(functional[j])
+            if on_p:
+                products = [d * v for d in (lo, hi) for v in (low, high)]
+                self.total += _interval_min(on_p, min(products), max(products))
+            self._check_known(s, functional, low, high)
+
+    @staticmethod
+    def _check_line(side: int, slope: fmpq, intercept: fmpq, delta: tuple[fmpq, fmpq], s: tuple[fmpq, fmpq]) -> None:
+        """A line bounds Delta s over [l, r] if it does so at both ends (the bound is convex, or concave)."""
+        for end in s:
+            worst = max(side * d * end for d in delta)
+            if side * (slope * end + intercept) < worst:
+                raise NoProof
+
+    def _check_known(self, s: WindowSample, functional: Array, low: fmpq, high: fmpq) -> None:
+        """Where s depends on the input alone, its bounds are checked rather than trusted."""
+        n, nu = self.c.n, s.u.size
+        if np.any(functional[:n]) or np.any(functional[n + nu + 1 :]):
+            return
+        value = exact(functional[n + nu])
+        for j in range(nu):
+            if functional[n + j]:
+                value += exact(functional[n + j]) * exact(s.u[j])
+        if not low <= value <= high:
+            raise NoProof
+
+    def _disturbance(self, s: WindowSample, coefficients: list[fmpq]) -> None:
+        c = list(coefficients)
+        for h, multiplier in enumerate(s.on_w):
+            if multiplier:
+                m = exact(multiplier)
+                self._bound(m, self.c.w_rows_lower[h], self.c.w_rows_upper[h])
+                c = [v + m * exact(a) for v, a in zip(c, self.c.w_rows[h], strict=True)]
+        for value, low, high in zip(c, s.w_lower, s.w_upper, strict=True):
+            if value:
+                self._box(value, low, high)

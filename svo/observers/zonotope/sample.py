@@ -1,0 +1,276 @@
+"""One sample of the constrained-zonotope observer: what w, the channels and a measurement add to the set of the state.
+
+All in normal form, but for the certificates.
+
+An uncertainty enters as p = Delta s over the bounds [l, r] of s: the two lines of `WindowObserver`, as constraints over
+a generator of p. The same w and p enter the next state and the output.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.checks import Array
+from svo.models.normal_form import NormalForm
+from svo.observers.given_units import zonotope_proof_out
+from svo.observers.window.evidence import ArrivalSet, WindowCertificate, WindowSample
+from svo.observers.window.setup import channel_owners, disturbance_rows, output_is_disturbed
+from svo.observers.window_kernel import channel_factors
+from svo.observers.zonotope.certificate import ZonotopeCertificate, proven_support, rounded_up
+from svo.observers.zonotope.program import ZonotopeProgram
+from svo.observers.zonotope.zonotope import EPS, ConstrainedZonotope, unit
+
+NO_ROW = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A sample and all that is known at it.
+
+    Attributes
+    ----------
+    arrival : ConstrainedZonotope
+        Of the state, before the measurement of the sample.
+    joint : ConstrainedZonotope
+        Of (x, w, p), or of x as long as w and the channels have not entered.
+    data : WindowSample
+        Multipliers are zero.
+    gains, functionals : (nq, n + ny), (nq, n + nu + 1 + nw) arrays
+    left : (n + ny, n + nu + 1 + nw) array
+        Bound of what the channels leave out of the uncertainties.
+    on_output, on_w : (ny,), (nh,) arrays of int
+        Constraints of ``joint`` that are the rows of the outputs and of w; -1 where there is none.
+    on_p : tuple of int
+        Generators of those p that constraints bound.
+    is_open : bool
+        Whether w and the channels have entered.
+    """
+
+    arrival: ConstrainedZonotope
+    joint: ConstrainedZonotope
+    data: WindowSample
+    gains: Array
+    functionals: Array
+    left: Array
+    on_output: NDArray[np.int64]
+    on_w: NDArray[np.int64]
+    on_p: tuple[int, ...] = ()
+    is_open: bool = False
+
+
+class StageBuilder:
+    """Makes stages of one model.
+
+    Attributes
+    ----------
+    form : NormalForm
+    model : UncertainModel
+        That of the normal form.
+    is_late : bool
+        Whether the output depends on w or a channel, so that both enter before the measurement.
+    """
+
+    def __init__(self, form: NormalForm, eps: float) -> None:
+        self.form, self.model, self.eps = form, form.model, eps
+        model = form.model
+        self.is_late = output_is_disturbed(model)
+        self._owner = channel_owners(model)
+        self._delta = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
+        self._w_rows = disturbance_rows(form)
+
+    def first_set(self, first: ArrivalSet) -> ConstrainedZonotope:
+        """The set of first states."""
+        return ConstrainedZonotope.box(first.box_lower, first.box_upper).cut(first.rows, first.lower, first.upper)
+
+    def data(self, stack: Array, bounds: tuple[Array, Array, Array], u: Array, y: Array) -> WindowSample:
+        """What is known of a sample before the set is."""
+        w_lower, w_upper, noise = bounds
+        nq, nh, ny = len(self._owner), len(self._w_rows[1]), self.model.n_outputs
+        return WindowSample(
+            stack=stack, u=u, y=y, noise=noise, slack=np.zeros(ny), w_lower=w_lower, w_upper=w_upper,
+            s_lower=np.zeros(nq), s_upper=np.zeros(nq), lines=np.zeros((nq, 4)),
+            on_output=np.zeros(ny), on_w=np.zeros(nh), on_channel=np.zeros((nq, 2)),
+        )  # fmt: skip
+
+    def measured(self, states: ConstrainedZonotope, data: WindowSample) -> Stage:
+        """A set of states and the measurement of its sample."""
+        gains, functionals, left, complete = channel_factors(data.stack, self._owner, self._delta)
+        if not complete:
+            raise ValueError("an uncertainty has a higher rank at this sample than at the model's typical schedule")
+        nowhere = np.full(self.model.n_outputs, NO_ROW)
+        stage = Stage(states, states, data, gains, functionals, left, nowhere, np.full(len(data.on_w), NO_ROW))
+        return self._measure(self.opened(stage, data.u) if self.is_late else stage)
+
+    def opened(self, stage: Stage, u: Array) -> Stage:
+        """With w and the channels of the sample, once its input is known."""
+        data, n = replace(stage.data, u=u), self.model.n_states
+        joint = stage.joint.product_box(data.w_lower, data.w_upper)
+        first = len(joint.offset)
+        rows, lower, upper = self._w_rows
+        joint = joint.cut(np.hstack([np.zeros((len(rows), n)), rows]), lower, upper)
+        on_w = np.arange(first, len(joint.offset))
+        f, known = stage.functionals[:, self._columns()], self._known(stage.functionals, u)
+        terms = self._known(np.abs(stage.functionals), np.abs(u))
+        low, high = joint.range_of(f, known)
+        is_unsure = (low < 0.0) & (high > 0.0) & f.any(axis=1)
+        if is_unsure.any():
+            ends = ZonotopeProgram(joint).support(np.vstack([f[is_unsure], -f[is_unsure]]))
+            half = len(ends) // 2
+            low[is_unsure] = np.maximum(low[is_unsure], known[is_unsure] - ends[half:])
+            high[is_unsure] = np.minimum(high[is_unsure], known[is_unsure] + ends[:half])
+        rounding = unit(len(u)) * (terms + np.abs(low) + np.abs(high))
+        low, high = low - rounding, high + rounding
+        lines = np.array([_lines(*ends) for ends in zip(self._delta, low, high, strict=True)]).reshape(-1, 4)
+        on_p = []
+        for q in range(len(low)):
+            bounded = bool(f[q].any())
+            if bounded:
+                on_p.append(joint.generators.shape[1])
+            joint = self._with_channel(joint, q, f[q], (known[q], terms[q]), (low[q], high[q]), lines[q], bounded)
+        data = replace(data, s_lower=low, s_upper=high, lines=lines)
+        return replace(stage, joint=joint, data=data, on_w=on_w, on_p=tuple(on_p), is_open=True)
+
+    def predicted(self, stage: Stage, u: Array) -> tuple[Stage, ConstrainedZonotope]:
+        """The stage with all that drives the next state, and the set of the next state."""
+        if not stage.is_open:
+            stage = self.opened(stage, u)
+        stage = replace(stage, data=replace(stage.data, u=u))
+        n = self.model.n_states
+        M = np.hstack([stage.data.stack[0, :n][:, self._columns()], stage.gains[:, :n].T])
+        known = self._known(stage.data.stack[0, :n], u)
+        size = self._known(np.abs(stage.data.stack[0, :n]), np.abs(u))
+        return stage, stage.joint.affine_map(M, known).grown(unit(len(u)) * size + self._left_out(stage, slice(0, n)))
+
+    def certificate(self, stages: tuple[Stage, ...], multipliers: Array, last: int) -> ZonotopeCertificate | None:
+        """The certificate that multipliers of the last stage's constraints amount to; None if it proves nothing."""
+        n, arrival = self.model.n_states, stages[0].arrival
+        multipliers = multipliers / max(float(np.abs(multipliers).max(initial=0.0)), np.finfo(float).tiny)
+        costate, samples = np.zeros(n), []
+        for stage in reversed(stages):
+            on_output = _at(multipliers, stage.on_output)
+            on_w = _at(multipliers, stage.on_w)
+            on_w = np.where(np.isfinite(np.where(on_w > 0, self._w_rows[2], self._w_rows[1])), on_w, 0.0)
+            weight = np.concatenate([costate, on_output])
+            known, on_channel = weight @ stage.data.stack[0], np.zeros((len(self._owner), 2))
+            if stage.is_open:
+                on_p = stage.gains @ weight
+                # p lies between its lines, the one or the other by the sign of its weight
+                on_channel = np.maximum(np.stack([-on_p, on_p], axis=1), 0.0)
+                slopes = on_channel[:, 1] * stage.data.lines[:, 2] - on_channel[:, 0] * stage.data.lines[:, 0]
+                known = known + slopes @ stage.functionals
+            samples.append(replace(stage.data, on_output=on_output, on_w=on_w, on_channel=on_channel))
+            costate = known[:n]
+        on_arrival = multipliers[: len(arrival.offset)]
+        window = WindowCertificate(
+            first=last - len(stages) + 1, last=last, n=n, late=self.is_late, delta=self._delta, owner=self._owner,
+            w_rows=self._w_rows[0], w_rows_lower=self._w_rows[1], w_rows_upper=self._w_rows[2],
+            arrival=_half_space(arrival, -costate, on_arrival), on_arrival=np.ones(1), samples=tuple(samples[::-1]),
+        )  # fmt: skip
+        certificate = zonotope_proof_out(ZonotopeCertificate(arrival, on_arrival, window), self.form)
+        return certificate if certificate.verify() else None
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _columns(self) -> NDArray[np.int64]:
+        """Columns of x and w in a stack."""
+        layout = self.model.layout
+        return np.concatenate([np.arange(layout.n), np.arange(layout.n + layout.nu + 1, layout.shape[1])])
+
+    def _known(self, rows: Array, u: Array) -> Array:
+        """What the input and the constant contribute to rows over (x, u, 1, w)."""
+        n, nu = self.model.n_states, self.model.n_inputs
+        return rows[:, n : n + nu] @ u + rows[:, n + nu]
+
+    def _left_out(self, stage: Stage, rows: slice) -> Array:
+        """Bound of what the channels leave out of rows of [x(k+1); y(k)]."""
+        left = stage.left[rows]
+        if not left.any():
+            return np.zeros(len(left))
+        lower, upper = stage.joint.interval_hull()
+        reach, n = np.maximum(np.abs(lower), np.abs(upper)), self.model.n_states
+        w = reach[n : n + self.model.n_disturbances]
+        total = left @ np.concatenate([reach[:n], np.abs(stage.data.u), [1.0], w])
+        return total * (1.0 + unit(left.shape[1]))
+
+    def _with_channel(
+        self,
+        joint: ConstrainedZonotope,
+        q: int,
+        f: Array,
+        known: tuple[float, float],
+        s: tuple[float, float],
+        lines: Array,
+        bounded: bool,
+    ) -> ConstrainedZonotope:
+        """One p more: Delta's middle times s, a generator, and the two lines as constraints."""
+        lo, hi = self._delta[q]
+        middle = 0.5 * lo + 0.5 * hi
+        half = max(hi - middle, middle - lo) * max(abs(s[0]), abs(s[1]))
+        row = np.zeros((1, joint.dim))
+        row[0, : f.size] = middle * f
+        center = middle * known[0]
+        rounding = unit(self.model.n_inputs) * (abs(middle) * known[1] + half)
+        p = ConstrainedZonotope.box(np.array([-half]), np.array([half])).affine_map(np.eye(1), np.array([center]))
+        joint = joint.extended(row, p.grown(np.array([rounding])))
+        if not bounded:
+            return joint
+        rows = np.zeros((2, joint.dim))
+        rows[:, : f.size] = -lines[[0, 2], None] * f
+        rows[:, -1] = 1.0
+        size = np.abs(lines[[0, 2]]) * known[1] + np.abs(lines[[1, 3]])
+        above, below = lines[[1, 3]] + lines[[0, 2]] * known[0] + np.array([1.0, -1.0]) * unit(len(f)) * size
+        return joint.cut(rows, np.array([-np.inf, below]), np.array([above, np.inf]))
+
+    def _measure(self, stage: Stage) -> Stage:
+        data, n = stage.data, self.model.n_states
+        chosen = np.flatnonzero(~np.isnan(data.y))
+        columns = self._columns() if stage.is_open else np.arange(n)
+        rows = data.stack[0, n:][:, columns]
+        if stage.is_open:
+            rows = np.hstack([rows, stage.gains[:, n:].T])
+        known = self._known(data.stack[0, n:], data.u)
+        lower, upper = stage.joint.interval_hull()
+        size = np.abs(rows) @ np.maximum(np.abs(lower), np.abs(upper))
+        size += self._known(np.abs(data.stack[0, n:]), np.abs(data.u))
+        slack = self.eps * (np.abs(np.nan_to_num(data.y)) + size + data.noise)
+        slack[np.isnan(data.y)] = 0.0
+        rounding = unit(len(data.u)) * (np.abs(data.y) + size)
+        width = data.noise + slack + rounding
+        if stage.is_open:
+            width += self._left_out(stage, slice(n, None))
+        joint = stage.joint.cut(rows[chosen], (data.y - known - width)[chosen], (data.y - known + width)[chosen])
+        on_output = stage.on_output.copy()
+        on_output[chosen] = np.arange(len(stage.joint.offset), len(joint.offset))
+        return replace(stage, joint=joint, data=replace(data, slack=slack), on_output=on_output)
+
+
+def _at(values: Array, where: NDArray[np.int64]) -> Array:
+    """Values at some places, zero where there is none."""
+    return np.append(values, 0.0)[where]
+
+
+def _half_space(arrival: ConstrainedZonotope, direction: Array, multipliers: Array) -> ArrivalSet:
+    """Of an arrival set, its interval hull and the half-space in one direction that multipliers prove."""
+    axes, nothing = np.eye(arrival.dim), np.zeros(arrival.offset.size)
+    upper = np.array([rounded_up(proven_support(arrival, axis, nothing)) for axis in axes])
+    lower = -np.array([rounded_up(proven_support(arrival, -axis, nothing)) for axis in axes])
+    bound = rounded_up(proven_support(arrival, direction, multipliers))
+    return ArrivalSet(lower, upper, direction[None, :].copy(), np.array([-np.inf]), np.array([bound]))
+
+
+def _lines(delta: Array, low: float, high: float) -> tuple[float, float, float, float]:
+    """Slope and intercept of the lines above and below Delta s over [low, high], rounded outward."""
+    lo, hi = (float(v) for v in delta)
+    if low >= 0.0:
+        return hi, 0.0, lo, 0.0
+    if high <= 0.0:
+        return lo, 0.0, hi, 0.0
+    above, below = (hi * high - lo * low) / (high - low), (lo * high - hi * low) / (high - low)
+    reach = 8.0 * EPS * max(high, -low) * (abs(lo) + abs(hi) + np.array([abs(above), abs(below)]))
+    return (
+        above, float(max((lo - above) * low, (hi - above) * high) + reach[0]),
+        below, float(min((hi - below) * low, (lo - below) * high) - reach[1]),
+    )  # fmt: skip

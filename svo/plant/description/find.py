@@ -1,0 +1,68 @@
+"""A plant by what a user types: the name of a registered one, or the path of a TOML file."""
+
+from __future__ import annotations
+
+import shutil
+from functools import partial
+from pathlib import Path
+
+from svo.plant import MonitoredPlant, load_plant, registered_plants
+from svo.plant.description.plant import DescribedPlant, read_description
+from svo.store import digest_of, write_whole
+
+SUFFIX = ".toml"
+
+
+def find_plant(name: str, folder: Path = Path()) -> MonitoredPlant:
+    """The plant described in ``name`` if that ends in .toml (relative to ``folder``), else the registered one.
+
+    Raises
+    ------
+    ValueError
+        If no plant is registered by that name, or the description has a mistake.
+    OSError
+        If the file cannot be opened.
+    """
+    if name.endswith(SUFFIX):
+        return read_description(folder / name)
+    if name not in registered_plants() and (folder / name).is_file():
+        raise ValueError(f"{name} is a file, and no plant is registered by that name; a description ends in {SUFFIX}")
+    return load_plant(name)
+
+
+def check_kept_description(plant: MonitoredPlant, folder: Path) -> None:
+    """Raise a ValueError if another description stands where `keep_description` would put that of a plant."""
+    for file, copy in _copies(plant, folder):
+        if copy.exists() and copy.read_bytes() != file.read_bytes():
+            raise ValueError(
+                f"{copy} is another file than {file}, and alarms beside it may be about it; "
+                "give another folder, or move it away first"
+            )
+
+
+def keep_description(plant: MonitoredPlant, folder: Path) -> None:
+    """Copy the files that describe a plant beside its alarms, which name them; a registered plant has none.
+
+    Raises
+    ------
+    ValueError
+        If another file stands there; it is not overwritten.
+    """
+    check_kept_description(plant, folder)
+    for file, copy in _copies(plant, folder):
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        if not copy.exists():
+            write_whole(copy, partial(shutil.copyfile, file))
+
+
+def description_digest(plant: MonitoredPlant) -> dict[str, str]:
+    """SHA-256 of each file that describes a plant, by name; a registered plant has none."""
+    return {file.name: digest_of(file) for file in plant.files} if isinstance(plant, DescribedPlant) else {}
+
+
+def _copies(plant: MonitoredPlant, folder: Path) -> list[tuple[Path, Path]]:
+    """The files of a description and where they are kept."""
+    if not isinstance(plant, DescribedPlant):
+        return []
+    home = plant.files[0].parent
+    return [(file, folder / file.relative_to(home)) for file in plant.files]

@@ -1,0 +1,203 @@
+"""A plant that a TOML file describes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo.interval.on_log import ThresholdDetection, detect_thresholds
+from svo.isolation.architectures import ArchitectureI, ArchitectureII
+from svo.isolation.bank import Bank
+from svo.logs.log import Log
+from svo.logs.names import Column, Columns
+from svo.models.model import UncertainModel
+from svo.observers.window.observer import WindowObserver
+from svo.plant import no_schedule
+from svo.plant.description.faults import FaultModel, faults_of
+from svo.plant.description.interval import IntervalSettings, interval_settings
+from svo.plant.description.model import box_of, model_file, model_of
+from svo.plant.description.table import Table, read_table
+
+_TOP = ("title", "Ts", "columns", "model", "initial", "observer", "faults", "global", "bank", "interval_detector")
+STATED = "stated"
+
+
+@dataclass(frozen=True)
+class ObserverSettings:
+    """How every observer of a described plant runs; arguments of `svo.WindowObserver`."""
+
+    horizon: int | None = 10
+    template: str | NDArray[np.float64] = "box"
+
+
+@dataclass(frozen=True, eq=False)
+class DescribedPlant:
+    """A `svo.plant.MonitoredPlant` with one noise set, "stated": the bounds of the file.
+
+    Attributes
+    ----------
+    name, title : str
+        The file's name, and one line for people.
+    columns : Columns
+    model : UncertainModel
+        The healthy plant.
+    initial : HPolytope
+        Bounded set that contains the state at the first sample.
+    faults : mapping of str to FaultModel
+        May be empty: then the bank detects only.
+    observer : ObserverSettings
+    global_set : HPolytope or None
+        Bounded set that the state never leaves, healthy or faulty. With it the bank is Architecture II; without it
+        Architecture I, where every fault model must contain the nominal plant.
+    bank_options : mapping of str to int
+        Any of debounce, recovery and timeout.
+    files : tuple of path
+        The files that describe the plant.
+    interval : IntervalSettings or None
+        An interval detector to run beside the bank.
+    """
+
+    name: str
+    title: str
+    columns: Columns
+    model: UncertainModel
+    initial: HPolytope
+    faults: Mapping[str, FaultModel]
+    observer: ObserverSettings
+    global_set: HPolytope | None
+    bank_options: Mapping[str, int]
+    files: tuple[Path, ...]
+    interval: IntervalSettings | None = None
+    noise_sets: tuple[str, ...] = (STATED,)
+
+    @property
+    def Ts(self) -> float:
+        """Sampling time [s]."""
+        return self.model.Ts
+
+    def bank(self, noise: str) -> Bank:
+        """A fresh isolation bank.
+
+        Raises
+        ------
+        ValueError
+            If ``noise`` is not "stated".
+        """
+        if noise not in self.noise_sets:
+            raise ValueError(f"noise is {noise!r}; expected {STATED!r}, the bounds of {self.name}")
+        nominal = self._observer(self.model)
+        faults = {name: self._observer(fault.model) for name, fault in self.faults.items()}
+        if self.global_set is None:
+            return ArchitectureI(nominal, faults, **self.bank_options)
+        class_one = tuple(name for name, fault in self.faults.items() if fault.contains_nominal)
+        return ArchitectureII(nominal, faults, self.global_set, class_one, **self.bank_options)
+
+    def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
+        """A described model has no schedule."""
+        return no_schedule
+
+    def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
+        """What the interval detector says about a log; None if there is none in the file."""
+        if self.interval is None:
+            return None
+        return detect_thresholds(*self.interval.detector(log, self.columns, self.Ts))
+
+    def _observer(self, model: UncertainModel) -> WindowObserver:
+        return WindowObserver(model, self.initial, horizon=self.observer.horizon, template=self.observer.template)
+
+
+def read_description(path: str | Path) -> DescribedPlant:
+    """Read a plant from a TOML file.
+
+    Raises
+    ------
+    ValueError
+        Naming file, table and key, what was found and what was expected.
+    OSError
+        If the file cannot be opened.
+    """
+    path = Path(path)
+    top = read_table(path, _TOP)
+    columns = _columns(top)
+    names = {group: [c.name for c in getattr(columns, group)] for group in ("inputs", "outputs", "states")}
+    model = model_of(top, {group: found for group, found in names.items() if found})
+    faults = faults_of(top, model, names)
+    _check_architecture(top, faults)
+    return DescribedPlant(
+        name=path.name,
+        title=top.text("title", path.stem),
+        columns=columns,
+        model=model,
+        initial=box_of(top.table("initial"), model.n_states),
+        faults=faults,
+        observer=_observer_settings(top, model),
+        global_set=box_of(top.table("global"), model.n_states) if "global" in top else None,
+        bank_options=_bank_options(top),
+        files=_files(path, top.table("model")),
+        interval=interval_settings(top, columns),
+    )
+
+
+def _files(path: Path, model: Table) -> tuple[Path, ...]:
+    return (path, path.parent / model_file(model)) if "file" in model else (path,)
+
+
+def _columns(top: Table) -> Columns:
+    table = top.table("columns", ("time", "inputs", "outputs", "states"))
+    groups = {key: _group(table, key) for key in ("inputs", "outputs", "states")}
+    if not groups["outputs"]:
+        raise table.error("outputs", 'is missing; expected the measured columns, such as [{name = "y", unit = "m"}]')
+    columns = Columns(**groups, time=table.text("time", "time_s"))
+    every = [columns.time, *(c.name for c in columns.inputs + columns.outputs + columns.states)]
+    twice = [name for name in every if every.count(name) > 1]
+    if twice:
+        raise table.error(None, f"names the column {twice[0]!r} more than once")
+    return columns
+
+
+def _group(table: Table, key: str) -> tuple[Column, ...]:
+    return tuple(Column(entry.text("name"), entry.text("unit")) for entry in table.tables(key, ("name", "unit")))
+
+
+def _observer_settings(top: Table, model: UncertainModel) -> ObserverSettings:
+    table = top.table("observer", ("horizon", "template"))
+    horizon: int | None = None
+    if table.content.get("horizon") != "full":
+        horizon = table.count("horizon", ObserverSettings.horizon)
+        if horizon < 1:
+            raise table.error("horizon", f'is {horizon}; expected a number of samples >= 1, or "full" for all data')
+    template: str | NDArray[np.float64] = "box"
+    if "template" in table and table.content["template"] != "box":
+        template = table.array("template")
+    with table.errors():
+        # An observer checks its own arguments.
+        anywhere = HPolytope.box(np.zeros(model.n_states), np.ones(model.n_states))
+        WindowObserver(model.replace(physical=None, largest=None), anywhere, horizon, template)
+    return ObserverSettings(horizon, template)
+
+
+def _bank_options(top: Table) -> dict[str, int]:
+    table = top.table("bank", ("debounce", "recovery", "timeout"))
+    options = {key: table.count(key) for key in table.content}
+    for key, value in options.items():
+        if value < 1:
+            raise table.error(key, f"is {value}; expected a number of samples >= 1")
+    return options
+
+
+def _check_architecture(top: Table, faults: Mapping[str, FaultModel]) -> None:
+    class_two = [name for name, fault in faults.items() if not fault.contains_nominal]
+    if class_two and "global" not in top:
+        raise top.error(
+            None,
+            f"the model of fault {class_two[0]!r} need not contain the nominal plant, so its observer needs a set to "
+            "start from: add [global] with bounds that the state never leaves, or contains_nominal = true",
+        )
+    if "global" in top and not faults:
+        raise top.error("global", "has no meaning without faults; drop it, or add [faults.NAME]")

@@ -1,0 +1,278 @@
+"""The protocol behind the entry points of the group ``svo.plants``.
+
+A study, the command line and a report know a plant only through these names, so a user's own plant
+registers exactly as the ones that ship: an object that satisfies :class:`Plant`, named in the entry
+points of its distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.isolation.bank import Bank
+from svo.logs.log import Log
+from svo.logs.names import Columns
+from svo.models.model import UncertainModel
+from svo.plant.scheduling import Scheduler
+
+if TYPE_CHECKING:
+    from svo.detectors.detector import Detector
+    from svo.interval.on_log import ThresholdDetection
+
+HEALTHY = "none"
+Distribution = Literal["bounded", "gaussian"]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a paper reports for one fault and profile, as it is to be printed (seconds; "-" where silent)."""
+
+    detect: str
+    isolate: str
+
+
+class MonitoredPlant(Protocol):
+    """What detection on recorded data needs to know of a plant: a model and the columns, no simulator.
+
+    Attributes
+    ----------
+    name, title : str
+        The key in the registry (or the name of the file that describes it), and one line for people.
+    Ts : float
+        Sampling time [s].
+    noise_sets : tuple of str
+        Names of the noise and disturbance bounds; the first is the default.
+    columns : Columns
+        Names and units of the channels of a log file.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def Ts(self) -> float: ...
+
+    @property
+    def noise_sets(self) -> tuple[str, ...]: ...
+
+    @property
+    def columns(self) -> Columns: ...
+
+    def bank(self, noise: str) -> Bank:
+        """A fresh isolation bank."""
+        ...
+
+    def scheduler(self) -> Scheduler:
+        """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
+        ...
+
+
+@runtime_checkable
+class Plant(Protocol):
+    """What a study needs to know of a plant; every one is a `MonitoredPlant` too.
+
+    Attributes
+    ----------
+    name, title : str
+        The key in the registry, and one line for people.
+    Ts : float
+        Sampling time [s].
+    fault_time : float
+        Time of the first faulty sample [s].
+    faults : mapping of str to tuple of str
+        Fault names and, for each, its profiles ("step", "hard", "soft").
+    noise_sets : tuple of str
+        Names of the noise and disturbance bounds; the first is the default.
+    columns : Columns
+        Names and units of the channels of a log file.
+    reference : mapping of (fault, profile) to Reference
+        The paper's figures, printed beside ours; may be empty.
+    reference_title : str
+        Where those figures come from.
+    """
+
+    name: str
+    title: str
+    Ts: float
+    fault_time: float
+    faults: Mapping[str, tuple[str, ...]]
+    noise_sets: tuple[str, ...]
+    columns: Columns
+    reference: Mapping[tuple[str, str], Reference]
+    reference_title: str
+
+    def duration(self, fault: str, profile: str) -> float:
+        """Length of a run [s]; ``fault`` may be "none"."""
+        ...
+
+    def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
+        """One run with its true states; ``fault`` may be "none". The log carries the schedule of `scheduler`."""
+        ...
+
+    def bank(self, noise: str) -> Bank:
+        """A fresh isolation bank; its fault observers are named as in `faults`."""
+        ...
+
+    def scheduler(self) -> Scheduler:
+        """A fresh causal scheduling filter: called with each y in turn, returns the schedule of that sample."""
+        ...
+
+
+@dataclass(frozen=True)
+class StatedFault:
+    """A plant with one fault of one size, held from its first sample on.
+
+    Attributes
+    ----------
+    description : str
+        The fault and its size, for people.
+    model : UncertainModel
+        The plant with exactly this fault; unlike an observer's model it does not contain the fault-free plant.
+    """
+
+    description: str
+    model: UncertainModel
+
+
+@runtime_checkable
+class StatesFaults(Protocol):
+    """What a `Plant` offers besides if it can tell, before a study, which faults its bank can isolate."""
+
+    def stated_faults(self, noise: str, size: float = 1.0) -> Mapping[str, StatedFault]:
+        """Each fault at ``size`` times that of its first profile, with the bounds of a noise set.
+
+        A plant may leave ``size`` out; then only the full size can be asked for.
+        """
+        ...
+
+
+@runtime_checkable
+class LimitsInputs(Protocol):
+    """What a `Plant` offers besides if inputs can be designed for it.
+
+    Attributes
+    ----------
+    input_limits : (lower, upper)
+        Bounds of the inputs, each (nu,), in the units of `Columns.inputs`.
+    """
+
+    input_limits: tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+@runtime_checkable
+class OffersArchitectures(Protocol):
+    """What a `Plant` offers besides if its bank can be built in more than one way.
+
+    Attributes
+    ----------
+    architecture : str
+        Of the plant's own `bank`.
+    architectures : tuple of str
+        All that there are.
+    """
+
+    architecture: str
+    architectures: tuple[str, ...]
+
+    def with_architecture(self, architecture: str) -> Plant:
+        """The same plant with the bank of another architecture."""
+        ...
+
+
+def architecture_of(plant: MonitoredPlant) -> str | None:
+    """The architecture of a plant's bank; None if the plant has one kind of bank only."""
+    return plant.architecture if isinstance(plant, OffersArchitectures) else None
+
+
+def in_architecture(plant: Any, architecture: str | None) -> Any:
+    """The plant with the bank of an architecture; None = with its own.
+
+    Raises
+    ------
+    ValueError
+        If the plant offers no choice, or not this one.
+    """
+    if architecture is None:
+        return plant
+    name = plant.name
+    if not isinstance(plant, OffersArchitectures):
+        raise ValueError(f"plant {name!r} has one architecture only; leave the choice out")
+    if architecture not in plant.architectures:
+        raise ValueError(
+            f"plant {name!r} has no architecture {architecture!r}; it has {', '.join(plant.architectures)}"
+        )
+    return plant.with_architecture(architecture)
+
+
+@runtime_checkable
+class DetectsThresholds(Protocol):
+    """What a `MonitoredPlant` offers besides if an interval detector runs beside its bank."""
+
+    def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
+        """What that detector says about a log; None if there is none after all."""
+        ...
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A picture that a plant adds to its study, and what it shows."""
+
+    path: Path
+    title: str
+    caption: str
+
+
+@runtime_checkable
+class AddsExhibits(Protocol):
+    """What a `Plant` offers besides if its study has more to show than the bank's times to detect and isolate."""
+
+    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
+        """Run the additional part of a study, write tables and pictures into its folder, return the pictures."""
+        ...
+
+
+@runtime_checkable
+class TimesFaults(Protocol):
+    """What a `Plant` offers besides if its faults do not all begin at `fault_time`."""
+
+    def fault_start(self, fault: str, profile: str) -> float:
+        """Time of the first faulty sample of a fault and profile [s]."""
+        ...
+
+
+def fault_start(plant: Plant, fault: str, profile: str) -> float:
+    """Time of the first faulty sample of a fault and profile [s]; the plant's `fault_time` without a fault."""
+    if fault != HEALTHY and isinstance(plant, TimesFaults):
+        return plant.fault_start(fault, profile)
+    return plant.fault_time
+
+
+@runtime_checkable
+class ComparesDetectors(Protocol):
+    """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.
+
+    Attributes
+    ----------
+    compared_faults : tuple of (fault, profile)
+        The scenarios of the comparison.
+    """
+
+    compared_faults: tuple[tuple[str, str], ...]
+
+    def with_noise(self, distribution: Distribution) -> Plant:
+        """This plant with its noise drawn "bounded" (within the bounds of the noise set), or "gaussian" (the same
+        rms, unbounded); models and bounds stay as they are."""
+        ...
+
+    def detectors(self, noise: str) -> Sequence[Detector]:
+        """The detectors to compare with one noise set; their names differ."""
+        ...

@@ -1,0 +1,105 @@
+"""Arrays, sets and certificates as JSON, and back: floats in hexadecimal, read in the one form that is written.
+
+A record is somebody's file: what is read has the exact type and shape that `encode_value` writes, or is a ValueError.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import Certificate, HPolytope
+from svo.checks import Array
+
+LARGEST_INTEGER = 2**53
+_FLOAT = re.compile(r"0|nan|-?inf|-?0x[01](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
+
+
+def encode_value(value: Any) -> Any:
+    """Arrays, tuples and dataclasses of them as lists, dicts and text."""
+    if isinstance(value, np.ndarray):
+        if np.issubdtype(value.dtype, np.integer):
+            return value.tolist()
+        return {"shape": list(value.shape), "hex": " ".join(_hex(v) for v in value.ravel())}
+    if isinstance(value, tuple):
+        return [encode_value(item) for item in value]
+    if isinstance(value, HPolytope):
+        return {part: encode_value(getattr(value, part)) for part in "AbCd"}
+    if isinstance(value, Certificate):
+        return value.to_dict()
+    if hasattr(type(value), "__dataclass_fields__"):
+        entries = {f.name: encode_value(getattr(value, f.name)) for f in fields(value)}
+        return {name: entry for name, entry in entries.items() if entry is not None}
+    return value
+
+
+def decode_float(text: Any) -> float:
+    """A float that was written in hexadecimal, and in no other way: float.fromhex alone reads 50 as 80."""
+    if not isinstance(text, str) or not _FLOAT.fullmatch(text):
+        raise ValueError(f"expected a float as float.hex writes it, found {_short(text)}")
+    return float.fromhex(text)
+
+
+def decode_integer(value: Any) -> int:
+    """An integer that is written as one, of at most 2^53 in size."""
+    if type(value) is not int or abs(value) > LARGEST_INTEGER:
+        raise ValueError(f"expected an integer of at most 2^53 in size, found {_short(value)}")
+    return value
+
+
+def decode_array(value: Any) -> Array:
+    """A float array that `encode_value` wrote."""
+    check_keys(value, {"shape", "hex"})
+    shape = tuple(decode_integer(length) for length in _list(value["shape"]))
+    words = value["hex"].split(" ") if value["hex"] else []
+    return np.array([decode_float(word) for word in words], dtype=np.float64).reshape(shape)
+
+
+def decode_integers(value: Any) -> NDArray[np.int64]:
+    """An array (k,) of integers that `encode_value` wrote."""
+    return np.array([decode_integer(item) for item in _list(value)], dtype=np.int64)
+
+
+def decode_arrays(record: Any, names: set[str]) -> dict[str, Array]:
+    """A record of exactly these float arrays."""
+    check_keys(record, names)
+    return {key: decode_array(value) for key, value in record.items()}
+
+
+def decode_set(record: Any) -> HPolytope:
+    """A polytope that `encode_value` wrote."""
+    arrays = decode_arrays(record, set("AbCd"))
+    return HPolytope(*(arrays[part] for part in "AbCd"))
+
+
+def check_keys(record: Any, names: set[str]) -> None:
+    """Raise an error unless a record has exactly these entries."""
+    if not isinstance(record, Mapping):
+        raise TypeError(f"expected a table of {', '.join(sorted(names))}, found {_short(record)}")
+    if record.keys() != names:
+        wrong = sorted(str(key) for key in record.keys() ^ names)
+        raise ValueError(f"entries {_short(', '.join(wrong))} are missing or not of the format")
+
+
+def _list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError(f"expected a list, found {_short(value)}")
+    return value
+
+
+def _short(value: Any) -> str:
+    """A value as a message may show it: a sample of 4000 digits would flood the terminal."""
+    if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        return "a larger one"
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:40]}..."
+
+
+def _hex(value: float) -> str:
+    text = float(value).hex()
+    return "0" if text == "0x0.0p+0" else text

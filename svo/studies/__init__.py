@@ -1,0 +1,1 @@
+"""Many runs of a plant: isolation times, thresholds, detectors side by side."""

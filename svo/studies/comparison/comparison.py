@@ -1,0 +1,270 @@
+"""Scenarios x detectors x seeds: tuned on some seeds, judged on others, in as many processes as there are."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from svo.detectors.detector import Detector, Kind, Setting
+from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, load_plant
+from svo.store import Parts
+from svo.store.parts import Row
+from svo.studies.comparison.run import ComparedRun, Condition, compare_run
+from svo.studies.comparison.store import TunedRow, comparison_parts
+from svo.studies.comparison.tuning import FaultyRun, Tuned, tune
+from svo.studies.processes import worker_processes
+
+Progress = Callable[[int, int], None]
+DISTRIBUTIONS: tuple[Distribution, ...] = ("bounded", "gaussian")
+_TRAINING, _JUDGING, _CALIBRATION = 0, 1, 2  # branches of the seed
+_RUNS_IN_PART = 20
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared, and how much of it; the results follow from it, times of computation aside.
+
+    Parameters
+    ----------
+    plant : str
+        A registered plant that is a `svo.plant.ComparesDetectors`.
+    noise : str
+        Its noise set.
+    runs : int
+        Judged runs of each scenario and distribution.
+    seed : int
+    rate : float
+        False-alarm rate that every tuned detector gets: the share of fault-free runs with an alarm.
+    healthy_training, faulty_training : int
+        Training runs without a fault, and of each scenario, to learn from and to find inner parameters.
+    healthy_calibration : int
+        Further training runs without a fault, to set the level at which every detector has the rate.
+    healthy_runs : int
+        Judged runs without a fault.
+    evaluations : int
+        Settings that the optimiser may try for each detector.
+    distributions : tuple of {"bounded", "gaussian"}
+    """
+
+    plant: str
+    noise: str
+    runs: int = 50
+    seed: int = 0
+    rate: float = 0.02
+    healthy_training: int = 50
+    faulty_training: int = 10
+    healthy_calibration: int = 300
+    healthy_runs: int = 200
+    evaluations: int = 15
+    distributions: tuple[Distribution, ...] = DISTRIBUTIONS
+
+    def __post_init__(self) -> None:
+        training = ("healthy_training", "faulty_training", "healthy_calibration")
+        for name in ("runs", *training, "healthy_runs", "evaluations"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected at least 1")
+        if not 0 <= self.rate < 1:
+            raise ValueError(f"rate is {self.rate}; expected a share of fault-free runs in [0, 1)")
+
+    def parts(self) -> Iterator[Part]:
+        """The judged runs, a few of one scenario at a time."""
+        scenarios = 1 + len(compared_plant(self.plant).compared_faults)
+        for distribution in self.distributions:
+            for scenario in range(scenarios):
+                seeds = self.seeds(_JUDGING, scenario, self.runs if scenario else self.healthy_runs)
+                for first in range(0, len(seeds), _RUNS_IN_PART):
+                    yield Part(distribution, scenario, tuple(seeds[first : first + _RUNS_IN_PART]))
+
+    def seeds(self, branch: int, scenario: int, count: int) -> list[int]:
+        """Seeds of the runs of one scenario (0 = without a fault), the same for every detector and distribution."""
+        sequence = np.random.SeedSequence(self.seed, spawn_key=(branch, scenario))
+        return [int(s) for s in sequence.generate_state(count, np.uint64)]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some judged runs of one scenario (0 = without a fault)."""
+
+    distribution: Distribution
+    scenario: int
+    seeds: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The outcome: one tuned setting for each distribution and detector, and one row for each judged run."""
+
+    comparison: Comparison
+    kinds: Mapping[str, Kind]
+    tuned: dict[tuple[str, str], Tuned] = field(default_factory=dict)
+    rows: list[ComparedRun] = field(default_factory=list)
+
+    def settings(self, distribution: Distribution) -> list[Setting]:
+        """Of all detectors, in their order."""
+        return [tuned.setting for (of, _), tuned in self.tuned.items() if of == distribution]
+
+
+def run_comparison(
+    comparison: Comparison,
+    workers: int = 1,
+    progress: Progress | None = None,
+    *,
+    out: str | Path | None = None,
+    resume: bool = False,
+) -> Compared:
+    """Tune every detector on training seeds and judge it on others.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    workers : int
+        Number of processes; 1 runs in this one.
+    progress : callable, optional
+        Called with (tasks done, tasks in all).
+    out : path, optional
+        A folder that keeps what each task gave, so that an interrupted comparison can go on.
+    resume : bool
+        Go on with the comparison in ``out``.
+
+    Raises
+    ------
+    TypeError
+        If the plant offers no comparison.
+    ValueError
+        If a noise set is unknown, detectors share a name, ``workers`` is below 1, or the folder cannot be used (see
+        `svo.studies.comparison.store.comparison_parts`).
+    """
+    if workers < 1:
+        raise ValueError(f"workers is {workers}; expected at least 1 process")
+    detectors = compared_plant(comparison.plant).detectors(comparison.noise)
+    names = [detector.name for detector in detectors]
+    if len(set(names)) < len(names):
+        raise ValueError(f"detectors are named {', '.join(names)}; expected different names")
+    compared = Compared(comparison, {detector.name: detector.kind for detector in detectors})
+    tunings = [(distribution, index) for distribution in comparison.distributions for index in range(len(names))]
+    parts = list(comparison.parts())
+    counted = functools.partial(_counted, progress, len(tunings) + len(parts))
+    kept = nullcontext() if out is None else comparison_parts(Path(out), comparison, resume)
+    with kept as keep, _pool(min(workers, max(len(tunings), len(parts)))) as submit:
+        tasks: list[tuple[Any, ...]] = [(comparison, *task) for task in tunings]
+        found = counted(0, _results(submit, _tuned_rows, tasks, keep.tuned if keep else None))
+        for (distribution, index), (row,) in zip(tunings, found, strict=True):
+            compared.tuned[distribution, names[index]] = row.tuned()
+        tasks = [(comparison, part, compared.settings(part.distribution)) for part in parts]
+        for rows in counted(len(tunings), _results(submit, judge, tasks, keep.judged if keep else None)):
+            compared.rows.extend(rows)
+    order = {key: place for place, key in enumerate(compared.tuned)}
+    compared.rows.sort(key=lambda row: order[row.distribution, row.detector])  # stable: scenarios and seeds keep theirs
+    return compared
+
+
+@functools.cache
+def compared_plant(name: str) -> ComparesDetectors:
+    """The registered plant, which offers a comparison; loaded once a process."""
+    plant = load_plant(name)
+    if not isinstance(plant, ComparesDetectors):
+        raise TypeError(f"plant {name!r} offers no detectors to compare; it is no svo.plant.ComparesDetectors")
+    return plant
+
+
+def tune_detector(comparison: Comparison, distribution: Distribution, index: int) -> Tuned:
+    """Tune one detector under one distribution of the noise."""
+    offer = compared_plant(comparison.plant)
+    plant, detector = offer.with_noise(distribution), offer.detectors(comparison.noise)[index]
+    return _tune(comparison, plant, detector, ((HEALTHY, HEALTHY), *offer.compared_faults))
+
+
+def judge(comparison: Comparison, part: Part, settings: Sequence[Setting]) -> list[ComparedRun]:
+    """All detectors over some runs of one scenario: every run is simulated once."""
+    offer = compared_plant(comparison.plant)
+    plant, detectors = offer.with_noise(part.distribution), offer.detectors(comparison.noise)
+    fault, profile = ((HEALTHY, HEALTHY), *offer.compared_faults)[part.scenario]
+    condition = Condition(part.distribution, fault, profile, fault_start(plant, fault, profile))
+    rows = []
+    for place, seed in enumerate(part.seeds):
+        log = plant.simulate(fault, profile, comparison.noise, seed)
+        for detector, setting in zip(detectors, settings, strict=True):
+            if place == 0:
+                compare_run(detector, setting, log, condition, seed)  # untimed: no judged run pays for compilation
+            rows.append(compare_run(detector, setting, log, condition, seed))
+    return rows
+
+
+def _tune(comparison: Comparison, plant: Plant, detector: Detector, scenarios: Sequence[tuple[str, str]]) -> Tuned:
+    if detector.fixed is not None:
+        return Tuned(detector.fixed, np.nan, 0)
+    healthy, faulty = [], []
+    for scenario, (fault, profile) in enumerate(scenarios):
+        count = comparison.healthy_training if fault == HEALTHY else comparison.faulty_training
+        for seed in comparison.seeds(_TRAINING, scenario, count):
+            log = plant.simulate(fault, profile, comparison.noise, seed)
+            if fault == HEALTHY:
+                healthy.append(detector.prepare(log))
+            else:
+                first = round((fault_start(plant, fault, profile) - float(log.time[0])) / plant.Ts)
+                faulty.append(FaultyRun(f"{fault} {profile}", detector.prepare(log), first))
+    calibration = _Prepared(plant, detector, comparison)
+    return tune(detector, healthy, faulty, calibration, comparison.rate, comparison.evaluations)
+
+
+class _Prepared(Sequence[Any]):
+    """The calibration runs, simulated as they are asked for: all at once they fill the memory."""
+
+    def __init__(self, plant: Plant, detector: Detector, comparison: Comparison) -> None:
+        self._plant, self._detector, self._noise = plant, detector, comparison.noise
+        self._seeds = comparison.seeds(_CALIBRATION, 0, comparison.healthy_calibration)
+
+    def __len__(self) -> int:
+        return len(self._seeds)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._detector.prepare(self._plant.simulate(HEALTHY, HEALTHY, self._noise, self._seeds[index]))
+
+
+Submit = Callable[..., Callable[[], Any]]
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[Submit]:
+    """What starts a call, here or in one of so many processes, and gives a function that waits for its result."""
+    if workers == 1:
+        yield functools.partial
+        return
+    with worker_processes(workers, finish=False) as pool:  # a task may take minutes
+        yield lambda *call: pool.submit(*call).result
+
+
+def _results(
+    submit: Submit, function: Callable[..., list[Row]], tasks: Sequence[tuple[Any, ...]], keep: Parts[Row] | None
+) -> Iterator[list[Row]]:
+    """The rows of each task, in the order of the tasks; of those that are kept, without doing them again."""
+    done = set() if keep is None else set(keep.survey().intact)
+    results = {
+        place: submit(_kept, keep, place, function, task) for place, task in enumerate(tasks) if place not in done
+    }
+    for place in range(len(tasks)):
+        yield results[place]() if place in results else keep.rows([place])  # type: ignore[union-attr]
+
+
+def _kept(keep: Parts[Row] | None, place: int, function: Callable[..., list[Row]], task: tuple[Any, ...]) -> list[Row]:
+    rows = function(*task)
+    if keep is not None:
+        keep.write(place, rows)
+    return rows
+
+
+def _tuned_rows(comparison: Comparison, distribution: Distribution, index: int) -> list[TunedRow]:
+    return [TunedRow.of(tune_detector(comparison, distribution, index))]
+
+
+def _counted(progress: Progress | None, total: int, done: int, results: Iterator[Any]) -> Iterator[Any]:
+    for count, result in enumerate(results, start=done + 1):
+        if progress is not None:
+            progress(count, total)
+        yield result

@@ -1,0 +1,123 @@
+"""One run of one detector, judged: delays, false alarms, isolation, cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import process_time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.detectors.detector import NOBODY, Detector, Setting
+from svo.indices import detection_indices
+from svo.logs.log import Log
+from svo.plant import HEALTHY
+
+
+@dataclass(frozen=True)
+class ComparedRun:
+    """A row of the run table. Times that do not exist are None.
+
+    Attributes
+    ----------
+    distribution, detector, fault, profile : str
+    seed : int
+        `with_noise(distribution).simulate(fault, profile, noise, seed)` gives this very run.
+    first_alarm_s : float or None
+        From the fault to the first alarm that begins at or after it; the first faulty sample counts as one sampling
+        time. One that stood before is a false alarm and no detection, however long it stands.
+    delay_s : float or None
+        From the fault to the last switch from false to true (section 2.4 of the survey). None too if the alarm is
+        from before the fault.
+    false_alarm : bool
+        An alarm before the fault; at any time in a run without one.
+    false_detection_rate, non_detection_rate : float or None
+        Shares of time, before and from the fault on.
+    isolated_as : str or None
+        The first fault whose naming began at or after the fault; what was named before tells nothing of it.
+    isolation_delay_s : float or None
+        To that naming, if it is right.
+    microseconds_per_sample : float
+        CPU time, everything that depends on the log included.
+    width : float or None
+        Mean over samples and quantities of the width of the detector's bounds.
+    """
+
+    distribution: str
+    detector: str
+    fault: str
+    profile: str
+    seed: int
+    first_alarm_s: float | None
+    delay_s: float | None
+    false_alarm: bool
+    false_detection_rate: float | None
+    non_detection_rate: float | None
+    isolated_as: str | None
+    isolation_delay_s: float | None
+    microseconds_per_sample: float
+    width: float | None
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What was simulated: the noise's distribution, the fault and its profile, and when the fault began [s]."""
+
+    distribution: str
+    fault: str
+    profile: str
+    fault_time: float
+
+
+def compare_run(detector: Detector, setting: Setting, log: Log, condition: Condition, seed: int) -> ComparedRun:
+    """Run a detector over a log and judge it by the indices of section 2.4."""
+    healthy = condition.fault == HEALTHY
+    begun = process_time()
+    detection = detector.run(setting, detector.prepare(log), isolate=not healthy)
+    seconds = process_time() - begun
+    identity = (condition.distribution, detector.name, condition.fault, condition.profile, seed)
+    cost = 1e6 * seconds / max(detection.processed, 1)
+    width = None if detection.width is None else _finite(_mean(detection.width))
+    if healthy:
+        share = float(detection.alarm.mean())
+        return ComparedRun(*identity, None, None, bool(detection.alarm.any()), share, None, None, None, cost, width)
+    found = detection_indices(log.time, detection.alarm, condition.fault_time)
+    _, alarmed = _first_from(log, np.where(detection.alarm, 0, NOBODY), condition.fault_time)
+    named, naming = None, None
+    if detection.isolated is not None:
+        fault, naming = _first_from(log, detection.isolated, condition.fault_time)
+        named = None if fault == NOBODY else detector.faults[fault]
+    return ComparedRun(
+        *identity,
+        first_alarm_s=alarmed,
+        delay_s=_finite(found.delay) if found.delay > 0 else None,
+        false_alarm=found.false_alarm,
+        false_detection_rate=_finite(found.false_detection_rate),
+        non_detection_rate=found.non_detection_rate,
+        isolated_as=named,
+        isolation_delay_s=naming if named == condition.fault else None,
+        microseconds_per_sample=cost,
+        width=width,
+    )
+
+
+def _first_from(log: Log, said: NDArray[np.intp], fault_time: float) -> tuple[int, float | None]:
+    """What is said first of all that begins to be said (K,) from the fault on, and when [s, counted as delays are].
+
+    Something begins where the sample before says something else, or nothing.
+    """
+    begins = (said != NOBODY) & (said != np.append(NOBODY, said[:-1]))
+    first = detection_indices(log.time, begins, fault_time).first_alarm
+    if not np.isfinite(first):
+        return NOBODY, None
+    Ts = float(log.time[1] - log.time[0])
+    return int(said[round((fault_time + first - float(log.time[0])) / Ts) - 1]), first
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _mean(width: Any) -> float:
+    return float(np.nanmean(width)) if np.isfinite(width).any() else np.nan

@@ -1,0 +1,182 @@
+"""The samples of one exemplary run that the pictures need: models alive, boxes, some sets, true states."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo.checks import Array
+from svo.detection.detect import verdicts
+from svo.logs.log import Log
+from svo.observers.base import Step
+from svo.plant import Plant, fault_start
+from svo.store.npz_file import read_npz
+from svo.studies.configuration import Job
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The sets of the models alive at one sample; ``event`` says what happens at the next one."""
+
+    sample: int
+    event: str
+    sets: Mapping[str, HPolytope]
+
+
+@dataclass(frozen=True)
+class Exemplar:
+    """What one run looked like from inside.
+
+    Attributes
+    ----------
+    fault, profile, noise : str
+    architecture : str or None
+    names : tuple of str
+        The observers, "nominal" first.
+    time : (K,) array
+        Seconds.
+    alive : (K, n_observers) array of bool
+    lower, upper : (K, n_observers, n) arrays
+        Boxes of the state; NaN once a model is falsified.
+    x : (K, n) array
+        True states.
+    snapshots : tuple of Snapshot
+        Before each falsification, and at the end.
+    """
+
+    fault: str
+    profile: str
+    noise: str
+    names: tuple[str, ...]
+    time: Array
+    alive: NDArray[np.bool_]
+    lower: Array
+    upper: Array
+    x: Array
+    snapshots: tuple[Snapshot, ...]
+    architecture: str | None = None
+
+    @property
+    def last_falsification(self) -> int:
+        """Sample at which the last of the falsified models fell; 0 if none did."""
+        return max((self.died_at(i) or 0 for i in range(len(self.names))), default=0)
+
+    def died_at(self, observer: int) -> int | None:
+        """Sample from which an observer, by its number, is falsified to the end; None if it is alive there."""
+        alive = self.alive[:, observer]
+        return None if alive[-1] else int(np.flatnonzero(np.append(True, alive))[-1])
+
+    def save(self, path: Path) -> None:
+        """Write all of it as a compressed .npz without pickled objects."""
+        header: dict[str, Any] = {"fault": self.fault, "profile": self.profile, "noise": self.noise}
+        header |= {"names": list(self.names), "architecture": self.architecture}
+        header["snapshots"] = [{"sample": s.sample, "event": s.event, "sets": list(s.sets)} for s in self.snapshots]
+        arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
+        arrays |= {name: getattr(self, name) for name in ("time", "alive", "lower", "upper", "x")}
+        for i, snapshot in enumerate(self.snapshots):
+            for j, polytope in enumerate(snapshot.sets.values()):
+                arrays[f"A_{i}_{j}"], arrays[f"b_{i}_{j}"] = polytope.A, polytope.b
+        with path.open("wb") as file:
+            np.savez_compressed(file, **arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> Exemplar:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        ValueError
+            If the file is damaged, is something else, or unpacks to more than `svo.store.unpacking` allows.
+        """
+        data = read_npz(path)
+        try:
+            return _decode(data)
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise ValueError(f"{path} holds no samples of a run ({type(error).__name__}: {error})") from error
+
+
+def _decode(data: Mapping[str, NDArray[Any]]) -> Exemplar:
+    header = json.loads(str(data["header"]))
+    names = tuple(map(str, header["names"]))
+    arrays = {name: data[name] for name in ("time", "alive", "lower", "upper", "x")}
+    if arrays["x"].ndim != 2:
+        raise ValueError(f"x has the shape {arrays['x'].shape}; expected (samples, states)")
+    samples, states = arrays["x"].shape
+    shapes = {"time": (samples,), "alive": (samples, len(names)), "x": (samples, states)}
+    shapes |= dict.fromkeys(("lower", "upper"), (samples, len(names), states))
+    for name, array in arrays.items():
+        if array.shape != shapes[name] or array.dtype != (bool if name == "alive" else float):
+            raise ValueError(f"{name} has the shape {array.shape} and type {array.dtype}; expected {shapes[name]}")
+    snapshots = tuple(
+        Snapshot(
+            int(s["sample"]),
+            str(s["event"]),
+            {str(name): HPolytope(data[f"A_{i}_{j}"], data[f"b_{i}_{j}"]) for j, name in enumerate(s["sets"])},
+        )
+        for i, s in enumerate(header["snapshots"])
+    )
+    if any(not 0 <= s.sample < samples or not set(s.sets) <= set(names) for s in snapshots):
+        raise ValueError("a snapshot is not one of this run")
+    fault, profile, noise = (str(header[name]) for name in ("fault", "profile", "noise"))
+    return Exemplar(
+        fault, profile, noise, names, snapshots=snapshots, architecture=header["architecture"], **arrays
+    )  # fmt: skip
+
+
+def planar_outline(step: Step) -> HPolytope:
+    """Outer polytope of the state whose projection on any two axes has up to 16 sides.
+
+    Directions are spread evenly over each coordinate plane, in units of the box.
+    """
+    lower, upper = step.box
+    width = np.where(upper > lower, upper - lower, 1.0)
+    angles = np.delete(np.pi * np.arange(8) / 8, [0, 4])  # the axes are the box's own
+    rows = []
+    for i, j in itertools.combinations(range(width.size), 2):
+        plane = np.zeros((angles.size, width.size))
+        plane[:, i], plane[:, j] = np.cos(angles) / width[i], np.sin(angles) / width[j]
+        rows += [plane, -plane]
+    if not rows:
+        return step.set
+    directions = np.vstack(rows)
+    return step.set.intersection(HPolytope(directions, step.support(directions)))
+
+
+def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
+    """Drive a fresh bank over a log and keep what it knew at each sample."""
+    if log.x is None:
+        raise ValueError(f"plant {plant.name!r} simulates without true states; expected Log.x for the pictures")
+    bank = plant.bank(job.noise)
+    n, names = log.x.shape[1], tuple(bank.names)
+    alive = np.zeros((len(log), len(names)), dtype=bool)
+    lower = np.full((len(log), len(names), n), np.nan)
+    upper = lower.copy()
+    snapshots: list[Snapshot] = []
+    sets: dict[str, HPolytope] = {}
+    living: tuple[str, ...] = names
+    begins = fault_start(plant, job.fault, job.profile)
+    for k, verdict in enumerate(verdicts(bank, log)):
+        fallen = [name for name in living if name not in verdict.alive]
+        if fallen and sets:
+            snapshots.append(Snapshot(k - 1, f"{', '.join(fallen)} falsified next", sets))
+        living = verdict.alive
+        steps = {name: verdict.steps[name] for name in living if name in verdict.steps}  # class II waits
+        shown = log.time[k] >= begins - plant.Ts and len(living) > 1  # what a snapshot may keep
+        sets = {name: planar_outline(step) if shown else step.set for name, step in steps.items()}
+        alive[k] = [name in living for name in names]
+        for name, step in steps.items():
+            i = names.index(name)
+            lower[k, i], upper[k, i] = step.box
+    snapshots.append(Snapshot(len(log) - 1, "end of the run", sets))
+    return Exemplar(
+        job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots),
+        job.architecture,
+    )  # fmt: skip

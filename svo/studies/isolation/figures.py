@@ -1,0 +1,220 @@
+"""The pictures of a study as files, each composed of the panels of `svo.studies.isolation.plots`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from svo.plant import HEALTHY, Plant, fault_start
+from svo.store import file_name, write_whole
+from svo.studies.isolation import plots
+from svo.studies.isolation.exemplar import Exemplar
+from svo.studies.isolation.summary import ConditionSummary
+from svo.studies.isolation.tables import architectures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STYLE: Any = {
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#8A929B",
+    "xtick.color": "#3B434B",
+    "ytick.color": "#3B434B",
+    "legend.frameon": False,
+    "savefig.facecolor": "white",
+}
+DPI = 150
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture that has been written, and what it shows."""
+
+    path: Path
+    title: str
+    caption: str
+
+
+def write_pictures(
+    folder: Path, plant: Plant, summaries: Sequence[ConditionSummary], exemplars: Sequence[Exemplar]
+) -> list[Picture]:
+    """Write the pictures of a study as PNG files into a folder."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        return list(_pictures(folder, plant, summaries, exemplars))
+
+
+def _pictures(
+    folder: Path, plant: Plant, summaries: Sequence[ConditionSummary], exemplars: Sequence[Exemplar]
+) -> Iterator[Picture]:
+    for noise in dict.fromkeys(s.noise for s in summaries):
+        chosen = [s for s in summaries if s.noise == noise and s.fault != HEALTHY]
+        if not chosen:
+            continue
+        text = "Bars: mean; lines: 5–95 % of the runs; a count where not every run got there."
+        if plant.reference:
+            text += " Diamonds: the paper's figures; triangles point down from its upper bounds."
+        title = f"Times to detect and to isolate, {noise} noise"
+        banks = architectures(chosen)
+        draw = _delays if len(banks) == 1 else _architectures
+        yield save_picture(folder / f"delays_{file_name(noise)}.png", draw(plant, chosen), title, text)
+        for bank in banks:
+            shown = [e for e in exemplars if (e.noise, e.architecture) == (noise, bank) and e.fault != HEALTHY]
+            several = len(banks) > 1
+            where = f"{noise} noise" + (f", Architecture {bank}" if several else "")
+            yield from _of_runs(folder, plant, shown, where, file_name(f"{noise}_{bank}" if several else noise))
+
+
+def _of_runs(folder: Path, plant: Plant, shown: Sequence[Exemplar], where: str, suffix: str) -> Iterator[Picture]:
+    """The pictures of exemplary runs of one bank with one noise set."""
+    title = f"Models alive over time, {where}"
+    text = "One run of each fault and profile. A bar ends where the model is falsified, with the delay beside it."
+    yield save_picture(folder / f"alive_{suffix}.png", _alive(plant, shown), title, text)
+    slow = _slowest(shown)
+    if slow[0].x.shape[1] > 1:
+        title = f"Sets of the models and the true state, {where}"
+        text = (
+            "Projections on the two states in which the models drift furthest apart, in the slowest exemplary run "
+            "of each fault, at the last samples before models are falsified. The cross is the true state; a model "
+            "is falsified when its set becomes empty."
+        )
+        yield save_picture(folder / f"sets_{suffix}.png", _sets(plant, slow), title, text)
+    title = f"Bounds and true state, {where}"
+    text = "The same runs: what the nominal model (until it is falsified) and the true fault's model allow."
+    yield save_picture(folder / f"bounds_{suffix}.png", _bounds(plant, slow), title, text)
+
+
+def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
+    conditions = len({(s.fault, s.profile) for s in summaries})
+    figure = _figure(max(6.5, 1.0 * conditions), 6.0)
+    axes = figure.subplots(2, 1, sharex=True)
+    for ax, event in zip(axes, ("detect", "isolate"), strict=True):
+        plots.plot_architectures(summaries, event, plant.Ts, plant.reference, ax)
+        ax.set_ylabel(f"time to {event} [s]")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=len(handles))
+    return figure
+
+
+def _delays(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
+    from matplotlib.lines import Line2D
+
+    figure = _figure(max(5.5, 1.0 * len(summaries)), 3.9)
+    ax = figure.subplots()
+    plots.plot_delays(summaries, plant.Ts, plant.reference, ax)
+    handles = ax.get_legend_handles_labels()[0]
+    if any(key in plant.reference for key in ((s.fault, s.profile) for s in summaries)):
+        handles.append(
+            Line2D([], [], marker="D", color=plots.PAPER, linestyle="", markeredgecolor="white", label="paper")
+        )
+        handles.append(
+            Line2D(
+                [], [], marker="v", color=plots.PAPER, linestyle="", markeredgecolor="white", label="paper: below this"
+            )
+        )
+    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    return figure
+
+
+def _alive(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
+    faults = list(dict.fromkeys(e.fault for e in exemplars))
+    columns = max(sum(e.fault == fault for e in exemplars) for fault in faults)
+    figure = _figure(3.3 * columns + 0.6, 1.75 * len(faults) + 0.3)
+    axes = figure.subplots(len(faults), columns, squeeze=False)
+    for row, fault in zip(axes, faults, strict=True):
+        chosen = [e for e in exemplars if e.fault == fault]
+        for ax, exemplar in zip(row, chosen, strict=False):
+            plots.plot_alive(exemplar, _start(plant, exemplar), plant.Ts, ax)
+            ax.set_title(f"{exemplar.fault}, {exemplar.profile}")
+            if ax is not row[0]:
+                ax.set_yticklabels([])
+        for ax in row[len(chosen) :]:
+            ax.set_axis_off()
+    for ax in axes[:-1].ravel():
+        ax.set_xlabel("")
+    return figure
+
+
+def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
+    from matplotlib.ticker import MaxNLocator
+
+    # The end of a run, with one set left, says nothing where there is something to see before.
+    shown = [e.snapshots[:-1] or e.snapshots for e in exemplars]
+    columns = max(len(snapshots) for snapshots in shown)
+    figure = _figure(3.4 * columns + 0.4, 2.7 * len(exemplars) + 0.4)
+    axes = figure.subplots(len(exemplars), columns, squeeze=False)
+    for row, exemplar, snapshots in zip(axes, exemplars, shown, strict=True):
+        dims = plots.separating_states(exemplar)
+        for ax, snapshot in zip(row, snapshots, strict=False):
+            plots.plot_sets(exemplar, snapshot, dims, plant.columns.states, ax)
+            after = exemplar.time[snapshot.sample] - _start(plant, exemplar)
+            when = plots.in_seconds(after, plant.Ts, "+")
+            ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {when}\n{snapshot.event}", fontsize=9.5)
+            ax.xaxis.set_major_locator(MaxNLocator(4))
+            ax.yaxis.set_major_locator(MaxNLocator(5))
+        for ax in row[len(snapshots) :]:
+            ax.set_axis_off()
+    _model_legend(figure, exemplars[0].names)
+    return figure
+
+
+def _bounds(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
+    columns = min(2, len(plant.columns.states))
+    figure = _figure(4.6 * columns, 2.2 * len(exemplars) + 0.4)
+    axes = figure.subplots(len(exemplars), columns, squeeze=False)
+    for row, exemplar in zip(axes, exemplars, strict=True):
+        window = plots.time_window(exemplar, _start(plant, exemplar), plant.Ts)
+        for ax, state in zip(row, plots.separating_states(exemplar), strict=True):
+            plots.plot_bounds(exemplar, state, plant.columns.states, _start(plant, exemplar), ax)
+            plots.zoom(ax, exemplar, state, _start(plant, exemplar), window)
+        row[0].set_title(f"{exemplar.fault}, {exemplar.profile}")
+    for ax in axes[:-1].ravel():
+        ax.set_xlabel("")
+    _model_legend(figure, exemplars[0].names)
+    return figure
+
+
+def _model_legend(figure: Figure, names: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Patch | Line2D] = [
+        Patch(label=f"{name} model", edgecolor=colour, facecolor=(colour, 2.5 * plots.FILL), linewidth=1.5)
+        for name, colour in plots.colours(names).items()
+    ]
+    handles.append(Line2D([], [], color="#111111", marker="x", markeredgewidth=1.8, linewidth=1.1, label="true state"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+
+
+def _slowest(exemplars: Sequence[Exemplar]) -> list[Exemplar]:
+    """Of each fault, the exemplary run in which most samples pass before the last falsification."""
+    slowest: dict[str, Exemplar] = {}
+    for exemplar in exemplars:
+        best = slowest.get(exemplar.fault)
+        if best is None or exemplar.last_falsification > best.last_falsification:
+            slowest[exemplar.fault] = exemplar
+    return list(slowest.values())
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def save_picture(path: Path, figure: Figure, title: str, caption: str) -> Picture:
+    """Write a figure as a PNG file, whole or not at all."""
+    write_whole(path, lambda file: figure.savefig(file, dpi=DPI))
+    return Picture(path, title, caption)
+
+
+def _start(plant: Plant, exemplar: Exemplar) -> float:
+    return fault_start(plant, exemplar.fault, exemplar.profile)

@@ -1,0 +1,119 @@
+"""What the report's script draws: every run as a dot, and one run of each kind sample by sample, as compact JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from svo.plant import HEALTHY, Plant, fault_start
+from svo.studies.isolation.exemplar import Exemplar
+from svo.studies.isolation.plots import colours, column_label, separating_states, time_window
+from svo.studies.isolation.run import RunRow
+
+_FRAMES = 160  # samples of a run that the page holds; more would only make it heavier
+_DIGITS = 6
+
+
+def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterable[Exemplar]) -> str:
+    """HTML of both views with their data, for the script report.js; nothing is loaded from elsewhere.
+
+    Parameters
+    ----------
+    plant : Plant
+        For its name, units and the time of the fault.
+    rows : sequence of RunRow
+    exemplars : iterable of Exemplar
+        Those of fault-free runs are left out: nothing happens in them. Without any other the section is empty.
+    """
+    flights = [_flight(plant, e) for e in exemplars if e.fault != HEALTHY]
+    if not flights:
+        return ""
+    data = {"plant": plant.name, "Ts": plant.Ts, "runs": [_run(row) for row in rows], "flights": flights}
+    # "<" cannot end the script element from inside a string.
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    options = "".join(f'<option value="{i}">{escape(flight["title"])}</option>' for i, flight in enumerate(flights))
+    return _SECTION.format(options=options, data=text)
+
+
+_SECTION = """<h2>Every run</h2>
+<p class="soft">One dot a run, left detection, right isolation. Point at a dot, touch it, or move with the arrow keys:
+its seed makes that very run.</p>
+<div class="scroll"><svg id="runs" role="group" tabindex="0" aria-describedby="run"
+aria-label="Delays of every run; left and right arrow choose a run"></svg></div>
+<p id="run" class="readout" aria-live="polite">&nbsp;</p>
+<h2>One run, step by step</h2>
+<p class="soft">Bounds of two states by each model alive, around the true state (cross). A model whose set becomes empty
+is falsified and disappears.</p>
+<p class="controls">
+<label>Run <select id="flight">{options}</select></label>
+<button id="play" type="button">Play</button>
+<label class="grow">Time <input id="time" type="range" min="0" value="0" step="1"></label>
+</p>
+<div class="scroll"><svg id="sets" role="img" aria-describedby="sample"
+aria-label="Bounds of two states by each model, and which models are alive when"></svg></div>
+<p id="sample" class="readout" aria-live="off">&nbsp;</p>
+<script id="data" type="application/json">{data}</script>"""
+
+
+def _run(row: RunRow) -> dict[str, Any]:
+    return {
+        "run": row.run,
+        "seed": row.seed,
+        "fault": row.fault,
+        "profile": row.profile,
+        "noise": row.noise,
+        "detect": row.detection_delay_s,
+        "isolate": row.isolation_delay_s,
+        "as": row.isolated_as,
+        "false": row.false_alarm,
+        "wrong": row.wrong_isolation,
+        "architecture": row.architecture,
+    }
+
+
+def _flight(plant: Plant, exemplar: Exemplar) -> dict[str, Any]:
+    """Boxes of the two states that tell the models apart, around the fault and the falsifications."""
+    onset = fault_start(plant, exemplar.fault, exemplar.profile)
+    begin, end = time_window(exemplar, onset, plant.Ts)
+    after = exemplar.time - onset
+    inside = np.flatnonzero((after >= begin) & (after <= end))
+    falls = [exemplar.died_at(i) for i in range(len(exemplar.names))]
+    fallen = np.array([k for k in falls if k is not None], dtype=int)
+    events = np.intersect1d(inside, np.concatenate([fallen, fallen - 1]))
+    kept = np.union1d(inside[:: -(-inside.size // _FRAMES)], events)  # never without the samples that matter
+    states = list(separating_states(exemplar))
+    tone = colours(exemplar.names)
+    models = [
+        {
+            "name": name,
+            "colour": tone[name],
+            "dies": _place(falls[i], kept),
+            "lower": _numbers(exemplar.lower[kept, i][:, states]),
+            "upper": _numbers(exemplar.upper[kept, i][:, states]),
+        }
+        for i, name in enumerate(exemplar.names)
+    ]
+    bank = f", Architecture {exemplar.architecture}" if exemplar.architecture else ""
+    return {
+        "title": f"{exemplar.fault}, {exemplar.profile}, {exemplar.noise} noise" + bank,
+        "axes": [column_label(plant.columns.states[i]) for i in states],
+        "time": _numbers(after[kept]),
+        "true": _numbers(exemplar.x[kept][:, states]),
+        "models": models,
+    }
+
+
+def _place(sample: int | None, kept: np.ndarray) -> int | None:
+    """Where a sample stands among those kept; None if it comes after them or never."""
+    return None if sample is None or sample > kept[-1] else int(np.searchsorted(kept, sample))
+
+
+def _numbers(values: np.ndarray) -> list[Any]:
+    """Nested lists of floats with few digits; None where there is no bound."""
+    if values.ndim > 1:
+        return [_numbers(row) for row in values]
+    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in values.tolist()]

@@ -1,0 +1,31 @@
+"""From a finished study's folder to what people read: summary.csv, pictures and report.html."""
+
+from __future__ import annotations
+
+from svo.plant import AddsExhibits, Plant
+from svo.studies.isolation.figures import Picture, write_pictures
+from svo.studies.isolation.interactive import interactive_section
+from svo.studies.isolation.report import write_report
+from svo.studies.isolation.store import StudyFolder
+from svo.studies.isolation.summary import ConditionSummary, summarise, write_summary
+
+
+def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) -> list[ConditionSummary]:
+    """Write summary.csv, the pictures and report.html into the study's folder; returns the summaries.
+
+    Raises
+    ------
+    ValueError
+        If parts of the study are damaged, unless these are to be left out.
+    """
+    rows, exemplars = folder.rows(without_damaged), folder.exemplars(without_damaged)
+    summaries = summarise(rows)
+    write_summary(folder.path / "summary.csv", summaries)
+    pictures = write_pictures(folder.path, plant, summaries, exemplars)
+    if isinstance(plant, AddsExhibits):
+        asked = folder.identity()["configuration"]
+        added = plant.exhibits(folder.path, asked["runs"], asked["seed"], asked["noise"])
+        pictures += [Picture(exhibit.path, exhibit.title, exhibit.caption) for exhibit in added]
+    interactive = interactive_section(plant, rows, exemplars)
+    write_report(folder.path / "report.html", plant, folder.identity(), summaries, pictures, interactive)
+    return summaries

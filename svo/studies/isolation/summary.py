@@ -1,0 +1,178 @@
+"""Statistics of a run table: delays, alarms that should not be, and cost, per noise set, fault and profile."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from svo.plant import HEALTHY
+from svo.store import write_csv
+from svo.studies.isolation.run import RunRow
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many of how many, with a confidence interval (Clopper and Pearson, exact for a binomial count)."""
+
+    count: int
+    of: int
+
+    @property
+    def value(self) -> float:
+        return self.count / self.of
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Bounds of the share at the confidence of the module, 95 %."""
+        tail = (1 - CONFIDENCE) / 2
+        low = stats.beta.ppf(tail, self.count, self.of - self.count + 1) if self.count else 0.0
+        high = stats.beta.ppf(1 - tail, self.count + 1, self.of - self.count) if self.count < self.of else 1.0
+        return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class Delays:
+    """Delays of some runs [s], those that were never reached counted as infinite.
+
+    Attributes
+    ----------
+    reached : Share
+        Runs in which the delay is finite.
+    mean : float or None
+        Over the runs that reached; None if none did.
+    mean_interval : (low, high) or None
+        Student's 95 % confidence interval of that mean; None with fewer than two values.
+    median, p05, p95 : float or None
+        Over ALL runs; None where the quantile falls among those that never reached.
+    """
+
+    reached: Share
+    mean: float | None
+    mean_interval: tuple[float, float] | None
+    median: float | None
+    p05: float | None
+    p95: float | None
+
+    @classmethod
+    def of(cls, delays: Sequence[float | None]) -> Delays:
+        """Statistics of delays, None for one that was never reached."""
+        finite = np.array([d for d in delays if d is not None])
+        median, p05, p95 = (_quantile(delays, q) for q in (0.5, 0.05, 0.95))
+        mean = float(finite.mean()) if finite.size else None
+        return cls(Share(finite.size, len(delays)), mean, _mean_interval(finite), median, p05, p95)
+
+
+@dataclass(frozen=True)
+class ConditionSummary:
+    """What happened in the runs of one noise set, fault and profile.
+
+    Attributes
+    ----------
+    detect, isolate : Delays
+    false_alarms, wrong_isolations : Share
+    survivors : mapping of str to int
+        In the runs that were not isolated: the models alive at the end, and in how many runs.
+    microseconds_median, microseconds_p99 : float
+        Per observer and sample: medians over the runs of the runs' median and 99th percentile.
+    undecided : int
+        Answers of observers that were neither a proof nor a point, in all runs.
+    architecture : str or None
+        Of the bank; None for a plant that has one kind of bank only.
+    """
+
+    noise: str
+    fault: str
+    profile: str
+    runs: int
+    detect: Delays
+    isolate: Delays
+    false_alarms: Share
+    wrong_isolations: Share
+    survivors: Mapping[str, int]
+    microseconds_median: float
+    microseconds_p99: float
+    undecided: int
+    architecture: str | None = None
+
+
+def summarise(rows: Iterable[RunRow]) -> list[ConditionSummary]:
+    """One summary per noise set, fault, profile and architecture, in the order of their first runs."""
+    groups: dict[tuple[str, str, str, str | None], list[RunRow]] = {}
+    for row in rows:
+        groups.setdefault((row.noise, row.fault, row.profile, row.architecture), []).append(row)
+    return [_summarise(*key, group) for key, group in groups.items()]
+
+
+def write_summary(path: Path, summaries: Iterable[ConditionSummary]) -> None:
+    """Write summaries as CSV, one row a condition; what does not exist is left empty."""
+    write_csv(path, [_flat(summary) for summary in summaries])
+
+
+def to_json(summaries: Iterable[ConditionSummary]) -> list[dict[str, Any]]:
+    """Summaries as plain dictionaries."""
+    return [asdict(summary) for summary in summaries]
+
+
+def _summarise(
+    noise: str, fault: str, profile: str, architecture: str | None, rows: list[RunRow]
+) -> ConditionSummary:
+    kept = Counter(row.alive_end or "none" for row in rows if fault != HEALTHY and row.isolation_delay_s is None)
+    return ConditionSummary(
+        noise=noise,
+        fault=fault,
+        profile=profile,
+        runs=len(rows),
+        detect=Delays.of([row.detection_delay_s for row in rows]),
+        isolate=Delays.of([row.isolation_delay_s for row in rows]),
+        false_alarms=Share(sum(row.false_alarm for row in rows), len(rows)),
+        wrong_isolations=Share(sum(row.wrong_isolation for row in rows), len(rows)),
+        survivors=dict(kept.most_common()),
+        microseconds_median=float(np.median([row.microseconds_per_step for row in rows])),
+        microseconds_p99=float(np.median([row.microseconds_p99 for row in rows])),
+        undecided=sum(row.undecided for row in rows),
+        architecture=architecture,
+    )
+
+
+def _quantile(delays: Sequence[float | None], q: float) -> float | None:
+    values = np.sort([np.inf if d is None else d for d in delays])
+    position = q * (len(values) - 1)
+    below, above = values[int(np.floor(position))], values[int(np.ceil(position))]
+    if not np.isfinite(above):
+        return None
+    return float(below + (above - below) * (position % 1))
+
+
+def _mean_interval(values: np.ndarray) -> tuple[float, float] | None:
+    if values.size < 2:
+        return None
+    half = stats.t.ppf((1 + CONFIDENCE) / 2, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size)
+    return float(values.mean() - half), float(values.mean() + half)
+
+
+def _flat(summary: ConditionSummary) -> dict[str, Any]:
+    row: dict[str, Any] = {name: getattr(summary, name) for name in ("noise", "fault", "profile", "runs")}
+    for name, delays in (("detect", summary.detect), ("isolate", summary.isolate)):
+        low, high = delays.mean_interval or (None, None)
+        row |= {f"{name}_mean_s": delays.mean, f"{name}_mean_low_s": low, f"{name}_mean_high_s": high}
+        row |= {f"{name}_median_s": delays.median, f"{name}_p05_s": delays.p05, f"{name}_p95_s": delays.p95}
+        row |= _flat_share(f"{name}_reached", delays.reached)
+    row |= _flat_share("false_alarm", summary.false_alarms) | _flat_share("wrong_isolation", summary.wrong_isolations)
+    row["not_isolated_share"] = 1 - summary.isolate.reached.value
+    row["survivors"] = "; ".join(f"{names}: {count}" for names, count in summary.survivors.items())
+    for name in ("microseconds_median", "microseconds_p99", "undecided", "architecture"):
+        row[name] = getattr(summary, name)
+    return row
+
+
+def _flat_share(name: str, share: Share) -> dict[str, Any]:
+    low, high = share.interval
+    return {f"{name}_runs": share.count, f"{name}_share": share.value, f"{name}_low": low, f"{name}_high": high}

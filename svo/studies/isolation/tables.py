@@ -1,0 +1,141 @@
+"""The tables of a study as rows of text, for the terminal and for the report alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from svo.plant import HEALTHY, Plant
+from svo.studies.isolation.summary import ConditionSummary, Delays, Share
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+NO_MEAN, NOT_WITHIN_RUN = "–", "∞"
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table of text; the first ``labels`` columns are names, the others figures."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    labels: int
+
+
+def delay_table(plant: Plant, summaries: Sequence[ConditionSummary]) -> TextTable:
+    """Delays of one noise set beside the paper's, in seconds.
+
+    Each delay is given as mean over the runs that reached it, median and 5-95 % range over all runs (an infinity
+    sign where the quantile falls among those that did not), and the number of runs that reached it.
+    """
+    several = len(architectures(summaries)) > 1
+    header = ["fault", "profile", *["arch."] * several]
+    for event in ("detect", "isolate"):
+        header += [f"{event} [s]\nmean", "\nmedian", "\n5–95 %", "\nruns"] + ["\npaper"] * bool(plant.reference)
+    header += ["false\nalarms", "wrong\nisol."]
+    rows = [_delay_row(plant, summary, several) for summary in summaries]
+    return TextTable(f"{summaries[0].noise} noise: {plant.title}", tuple(header), tuple(rows), labels=2 + several)
+
+
+def architectures(summaries: Iterable[ConditionSummary]) -> tuple[str | None, ...]:
+    """Architectures of the banks, in order."""
+    return tuple(dict.fromkeys(s.architecture for s in summaries))
+
+
+def not_isolated(summaries: Sequence[ConditionSummary]) -> list[str]:
+    """One line for each fault and profile with runs that were not isolated: how many, and who survived."""
+    lines = []
+    for s in summaries:
+        if s.survivors:
+            who = "; ".join(f"{names} ({count})" for names, count in s.survivors.items())
+            runs = f"{sum(s.survivors.values())} of {s.runs} runs"
+            where = f"{s.noise} noise" + (f", Architecture {s.architecture}" if s.architecture else "")
+            lines.append(f"not isolated, {where}: {s.fault} {s.profile} in {runs}; alive at the end: {who}")
+    return lines
+
+
+def counts(summaries: Sequence[ConditionSummary]) -> list[str]:
+    """The lines on alarms that should not be, with 95 % intervals of their rates."""
+    faulty = [s for s in summaries if s.fault != HEALTHY]
+    healthy = [s for s in summaries if s.fault == HEALTHY]
+    lines = []
+    if healthy:
+        lines.append(f"fault-free runs with an alarm: {_with_bound(total(s.false_alarms for s in healthy))}")
+    if faulty:
+        detected, isolated = (total(getattr(s, name).reached for s in faulty) for name in ("detect", "isolate"))
+        lines.append(
+            f"faulty runs detected: {detected.count} of {detected.of}; isolated: {isolated.count} of {isolated.of}"
+        )
+        lines.append(
+            f"faulty runs with an alarm before the fault: {_with_bound(total(s.false_alarms for s in faulty))}"
+        )
+    lines.append(f"runs with a wrong isolation: {_with_bound(total(s.wrong_isolations for s in summaries))}")
+    return lines
+
+
+def cost(summaries: Sequence[ConditionSummary]) -> str:
+    """The line on computing time."""
+    median = np.median([s.microseconds_median for s in summaries]) / 1e3
+    p99 = np.median([s.microseconds_p99 for s in summaries]) / 1e3
+    undecided = sum(s.undecided for s in summaries)
+    return (
+        f"computing time per observer and sample: median {median:.3f} ms, 99th percentile {p99:.3f} ms; "
+        f"undecided answers: {undecided}"
+    )
+
+
+def total(shares: Iterable[Share]) -> Share:
+    """Several shares taken together."""
+    every = list(shares)
+    return Share(sum(s.count for s in every), sum(s.of for s in every))
+
+
+def to_rich(table: TextTable) -> Table:
+    """The table for a terminal."""
+    from rich import box
+    from rich.table import Table
+
+    rich_table = Table(
+        title=table.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0)
+    )
+    for i, name in enumerate(table.header):
+        rich_table.add_column(name, justify="left" if i < table.labels else "right", no_wrap=True)
+    for row in table.rows:
+        rich_table.add_row(*row)
+    return rich_table
+
+
+def _delay_row(plant: Plant, summary: ConditionSummary, with_architecture: bool) -> tuple[str, ...]:
+    reference = plant.reference.get((summary.fault, summary.profile))
+    row = [
+        "no fault" if summary.fault == HEALTHY else summary.fault,
+        "" if summary.fault == HEALTHY else summary.profile,
+    ]
+    row += [summary.architecture or ""] * with_architecture
+    for event, delays in (("detect", summary.detect), ("isolate", summary.isolate)):
+        row += [""] * 4 if summary.fault == HEALTHY else _delay_cells(delays, plant.Ts)
+        if plant.reference:
+            row.append(getattr(reference, event) if reference else "")
+    row += [f"{share.count}/{share.of}" for share in (summary.false_alarms, summary.wrong_isolations)]
+    return tuple(row)
+
+
+def _delay_cells(delays: Delays, Ts: float) -> list[str]:
+    digits = max(0, math.ceil(-math.log10(Ts))) + 1  # one more than a sample needs: means fall between samples
+    low, high, median = (
+        NOT_WITHIN_RUN if q is None else f"{q:.{digits}f}" for q in (delays.p05, delays.p95, delays.median)
+    )
+    mean = NO_MEAN if delays.mean is None else f"{delays.mean:.{digits}f}"
+    return [mean, median, low if low == high else f"{low}–{high}", f"{delays.reached.count}/{delays.reached.of}"]
+
+
+def _with_bound(share: Share) -> str:
+    return (
+        f"{share.count} of {share.of} (95 % interval of the rate: {share.interval[0]:.1%} to {share.interval[1]:.1%})"
+    )

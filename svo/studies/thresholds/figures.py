@@ -1,0 +1,119 @@
+"""Pictures of a study of interval detectors: detection times beside a paper's, and where assumption (7) fails."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from svo.plant import HEALTHY
+from svo.store import file_name
+from svo.studies.isolation.figures import STYLE, Picture, save_picture
+from svo.studies.thresholds.run import LearnsDetectors
+from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOURS = {1: "#B5542C", 5: "#2B6CA3"}
+
+
+def write_pictures(
+    folder: Path,
+    plant: LearnsDetectors,
+    summaries: Sequence[DetectorSummary],
+    assumption: Sequence[AssumptionSummary],
+    windows: int,
+) -> list[Picture]:
+    """Write the pictures of a study as PNG files into a folder; ``windows`` is the longest window length q."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        return list(_pictures(folder, plant, summaries, assumption, windows))
+
+
+def _pictures(
+    folder: Path,
+    plant: LearnsDetectors,
+    summaries: Sequence[DetectorSummary],
+    assumption: Sequence[AssumptionSummary],
+    windows: int,
+) -> Iterator[Picture]:
+    for noise in dict.fromkeys(s.noise for s in summaries):
+        chosen = [s for s in summaries if s.noise == noise and s.fault != HEALTHY]
+        if chosen:
+            text = (
+                "Points: median; lines: 5–95 % of the runs, none where it is infinite. Diamonds: the paper's Table 1."
+            )
+            figure = _times(plant, chosen)
+            path = folder / f"detection_times_{file_name(noise)}.png"
+            yield save_picture(path, figure, f"Detection times, {noise} noise", text)
+        checked = [s for s in assumption if s.noise == noise]
+        if checked:
+            text = "Share of fault-free runs whose moving average over q samples exceeds the learnt bound."
+            title = f"Where assumption (7) fails, {noise} noise"
+            path = folder / f"assumption_{file_name(noise)}.png"
+            yield save_picture(path, _assumption(checked, windows), title, text)
+
+
+def _times(plant: LearnsDetectors, summaries: Sequence[DetectorSummary]) -> Figure:
+    from matplotlib.figure import Figure
+
+    scenarios = list(dict.fromkeys((s.fault, s.profile) for s in summaries))
+    columns = min(3, len(scenarios))
+    rows = -(-len(scenarios) // columns)
+    figure = Figure(figsize=(3.5 * columns, 2.5 * rows + 0.3), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, (fault, profile) in zip(axes, scenarios, strict=False):
+        plot_times(ax, [s for s in summaries if (s.fault, s.profile) == (fault, profile)])
+        ax.set_title(plant.label(fault, profile))
+    for ax in axes[len(scenarios) :]:
+        ax.set_axis_off()
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def plot_times(ax: Axes, summaries: Sequence[DetectorSummary]) -> list[Any]:
+    """Detection delays [s] of one scenario over the detectors, for each number of records; returns the artists."""
+    detectors = list(dict.fromkeys(s.detector for s in summaries))
+    artists: list[Any] = []
+    counts = list(dict.fromkeys(s.records for s in summaries))
+    for i, records in enumerate(counts):
+        group = [s for s in summaries if s.records == records]
+        at = np.array([detectors.index(s.detector) for s in group]) + 0.16 * (i - (len(counts) - 1) / 2)
+        low, median, high = (
+            np.array([np.nan if d is None else d for d in (getattr(s.detect, q) for s in group)])
+            for q in ("p05", "median", "p95")
+        )
+        label = f"{records} learning record{'s' * (records > 1)}"
+        artists.append(ax.vlines(at, low, high, color=_COLOURS.get(records, "0.4"), lw=1.5))
+        artists += ax.plot(at, median, "o", ms=4, color=_COLOURS.get(records, "0.4"), label=label)
+    paper = [(detectors.index(s.detector), s.paper - s.start + s.Ts) for s in summaries if s.paper is not None]
+    if paper:
+        artists += ax.plot(*zip(*paper, strict=True), "D", ms=5, mfc="none", mec="black", label="paper")
+    ax.set_xticks(range(len(detectors)), [d.removeprefix("a = ") for d in detectors])
+    ax.set_xlabel("pole a of the residual filter" if detectors[0].startswith("a = ") else "detector")
+    ax.set_ylabel("delay [s]")
+    ax.set_ylim(bottom=0)
+    return artists
+
+
+def _assumption(summaries: Sequence[AssumptionSummary], windows: int) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7, 3), layout="constrained")
+    ax = figure.subplots()
+    q = np.arange(1, windows + 1)
+    for s in summaries:
+        share = np.array([s.by_window.get(int(i), 0) / s.runs.of for i in q])
+        label = f"{s.records} learning record{'s' * (s.records > 1)}"
+        ax.plot(q, 100 * share, color=_COLOURS.get(s.records, "0.4"), label=label)
+    ax.set_xlabel("window length q [samples]")
+    ax.set_ylabel("fault-free runs that\nexceed λ_q [%]")
+    ax.set_ylim(bottom=0)
+    ax.legend()
+    return figure

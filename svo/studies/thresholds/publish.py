@@ -1,0 +1,146 @@
+"""From a finished study of interval detectors to what people read: summary.csv, pictures and report.html."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from svo.plant import HEALTHY
+from svo.studies.isolation.figures import Picture
+from svo.studies.isolation.report import html_facts, html_figure, html_table, write_page
+from svo.studies.isolation.store import StudyStore
+from svo.studies.isolation.summary import Share
+from svo.studies.isolation.tables import TextTable
+from svo.studies.thresholds import tables
+from svo.studies.thresholds.figures import write_pictures
+from svo.studies.thresholds.run import LEARNING_RECORDS, LearnsDetectors
+from svo.studies.thresholds.runner import read_rows
+from svo.studies.thresholds.summary import (
+    AssumptionSummary,
+    DetectorSummary,
+    summarise,
+    summarise_assumption,
+    write_summary,
+)
+
+_GLOSSARY = {
+    "alarm": "The filtered residual is beyond its threshold. It is a statistical alarm, not a proof: it rests on "
+    "assumption (7), that the noise keeps to what was learnt.",
+    "detection time": "Time of the first alarm at or after the first faulty sample, on the clock of the run.",
+    "median (5–95 %)": "Over all runs; ∞ where the quantile falls among runs without an alarm.",
+    "learning records": "Fault-free runs of the learning scenario, new ones for every run, from which the detector is "
+    "made with the paper's safety factor.",
+    "false alarm": "An alarm before the fault, or at any time in a fault-free run. Intervals of shares are exact 95 % "
+    "intervals (Clopper and Pearson).",
+}
+
+
+@dataclass(frozen=True)
+class DetectionStudy:
+    """A finished study: its summaries, and its tables and findings as text."""
+
+    summaries: list[DetectorSummary]
+    assumption: list[AssumptionSummary]
+    tables: list[TextTable]
+    findings: list[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain data, for JSON."""
+        return {
+            "summary": [_plain(s) for s in self.summaries],
+            "assumption": [
+                {
+                    "noise": s.noise,
+                    "records": s.records,
+                    "alarmed": _share(s.alarmed),
+                    "violated": _share(s.runs),
+                    "by_window": {str(q): count for q, count in s.by_window.items()},
+                }
+                for s in self.assumption
+            ],
+        }
+
+
+def publish(folder: StudyStore[Any], plant: LearnsDetectors, without_damaged: bool = False) -> DetectionStudy:
+    """Write summary.csv, the pictures and report.html into the study's folder; errors as `StudyStore.rows`."""
+    rows = read_rows(folder, without_damaged)
+    summaries, assumption = summarise(plant, rows), summarise_assumption(rows)
+    write_summary(folder.path / "summary.csv", summaries)
+    windows = max((q for s in assumption for q in s.by_window), default=1)
+    pictures = write_pictures(folder.path, plant, summaries, assumption, windows)
+    groups = [
+        [s for s in summaries if (s.noise, s.records) == key]
+        for key in dict.fromkeys((s.noise, s.records) for s in summaries)
+    ]
+    study = DetectionStudy(
+        summaries,
+        assumption,
+        [tables.detection_table(plant, group) for group in groups],
+        [*tables.assumption_lines(assumption), *_before_the_fault(summaries)],
+    )
+    _write_report(folder.path / "report.html", plant, folder.identity(), study, pictures)
+    return study
+
+
+def _before_the_fault(summaries: Sequence[DetectorSummary]) -> list[str]:
+    lines = []
+    for records in LEARNING_RECORDS:
+        faulty = [s for s in summaries if s.fault != HEALTHY and s.records == records]
+        if faulty:
+            alarmed, runs = (sum(getattr(s.false_alarms, n) for s in faulty) for n in ("count", "of"))
+            reached = sum(s.detect.reached.count for s in faulty)
+            lines.append(
+                f"faulty runs, all detectors, {records} learning record{'s' * (records > 1)}: detected "
+                f"{reached} of {runs}, alarm before the fault in {alarmed} of {runs}"
+            )
+    return lines
+
+
+def _write_report(
+    path: Path, plant: LearnsDetectors, identity: Mapping[str, Any], study: DetectionStudy, pictures: Sequence[Picture]
+) -> None:
+    configuration = identity["configuration"]
+    runs = f"{configuration['runs']} runs of each scenario, seed {configuration['seed']}"
+    noise = " ".join(f"--noise {name}" for name in configuration["noise"])
+    faults = "".join(f" --fault {name}" for name in configuration["faults"])
+    every = configuration["faults"] == [HEALTHY, *plant.faults]
+    command = (
+        f"svo study {plant.name} --runs {configuration['runs']} --seed {configuration['seed']} {noise}"
+        f"{'' if every else faults} --out DIR"
+    )
+    parts = [
+        f"<h1>Study of interval detectors: {escape(plant.title)}</h1>",
+        f'<p class="soft">{escape(runs)}</p>',
+        "<h2>What came out</h2>",
+        '<ul class="findings">' + "".join(f"<li>{escape(line)}.</li>" for line in study.findings) + "</ul>",
+        *(html_table(table) for table in study.tables),
+        f'<p class="soft">Paper: {escape(plant.reference_title)}.</p>',
+        "<h2>Pictures</h2>",
+        *(html_figure(picture) for picture in pictures),
+        "<h2>What is counted</h2>",
+        "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in _GLOSSARY.items()) + "</dl>",
+        "<h2>How to make it again</h2>",
+        f"<p><code>{escape(command)}</code></p>",
+        "<p>The table of runs is in <code>runs.parquet</code>, the statistics in <code>summary.csv</code>. "
+        "<code>svo simulate</code> with a run's seed makes that run's log.</p>",
+        html_facts("Configuration", configuration),
+        html_facts("Versions", identity["versions"]),
+    ]
+    write_page(path, f"Study of interval detectors: {plant.title}", parts)
+
+
+def _plain(s: DetectorSummary) -> dict[str, Any]:
+    names = ("noise", "fault", "profile", "records", "detector")
+    times = {f"{q}_s": s.time_of(getattr(s.detect, q)) for q in ("median", "p05", "p95")}
+    return (
+        {name: getattr(s, name) for name in names}
+        | times
+        | {"paper_s": s.paper, "detected": _share(s.detect.reached), "false_alarms": _share(s.false_alarms)}
+    )
+
+
+def _share(share: Share) -> dict[str, Any]:
+    return {"count": share.count, "of": share.of, "interval": list(share.interval)}
