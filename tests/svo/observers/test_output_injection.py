@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.logs.log import Log
+from svo.observers.window import observer as window_module
 from svo.observers.window.chain import prove_chain
-from svo.observers.window.observer import observer as window_module
 from svo.observers.window.output_injection import can_inject
 from tests.svo.observers import oracle
 from tests.svo.observers.window_system import judge

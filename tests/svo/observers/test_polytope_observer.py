@@ -15,7 +15,7 @@ from polytopes import HPolytope, convex_hull
 from svo import ArchitectureI, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
 from svo.faults import SensorFault, Step
 from svo.logs.log import Log
-from svo.observers.polytope.observer import vertex_images
+from svo.observers.polytope import vertex_images
 from svo.observers.polytope.vertex_images import FacetLimitError, hull_of_images, transitions
 from tests.svo.observers.random_plants import random_plant
 from tests.svo.observers.test_soundness import hull_cut_by_rows, random_initial, scalar_counterexample
