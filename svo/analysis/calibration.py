@@ -1,26 +1,29 @@
 """The smallest widening of a model's bounds that explains a healthy log which falsifies it.
 
 Elastic linear programs: every chosen bound may give way, at the cost of the widening relative to the bound itself, and
-the sum of these costs is least. The program holds a whole trajectory, so its answer is an explanation, not a promise.
+the sum of these costs is least. The program holds a whole trajectory, and what that needs is proven.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from polytopes import HPolytope
-from svo.analysis.elastic_program import Bound, ElasticProgram, bounds_of, widened
+from svo.analysis.elastic_bounds import Bound, bounds_of
+from svo.analysis.elastic_program import ElasticProgram, Explained
+from svo.analysis.explanation import NEGLIGIBLE, explain
 from svo.analysis.lifted_rows import bounding_box
+from svo.analysis.trajectory import Trajectory
 from svo.checks import Array
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
 
-NEGLIGIBLE = 1e-7  # relative widening that the solver's tolerance may cause
-_ROUNDED_UP = 1e-6  # relative to the bound; room for the solver's tolerance
+_ROOM = 1e-6  # relative: of bounds that are wide enough while the first sample of another is looked for
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,9 @@ class Widening:
     bound : str
         Such as "noise alpha", "disturbance gust u" or "Delta M_u".
     amount : float
-        To be added at either end, in the unit of the bound (rounded up by a millionth of the bound).
+        To be added at either end, in the unit of the bound, rounded up.
     relative : float
-        ``amount`` as a fraction of the half-width; of 1 where the half-width is zero.
+        ``amount`` as a fraction of the half-width; inf where the half-width is zero.
     sample : int
         First sample at which it is needed: with the other bounds widened and this one as it was, the data up to here
         cannot be explained, the data before can.
@@ -57,10 +60,11 @@ class Calibration:
     chosen : tuple of str
         Names of all bounds that could have been widened.
     model : UncertainModel
-        The model with these bounds widened: a trajectory of it explains every sample of the log.
+        The model with these bounds widened. It has a trajectory through every sample of the log: no observer of it
+        falsifies the log.
     smallest : bool
-        Whether no cheaper widening explains the log. It is not claimed if the log was longer than one program, or if
-        a Delta multiplies a state or a disturbance.
+        Whether no widening that is cheaper, by more than the solver's tolerance, explains the log. It is not claimed
+        if the log was longer than one program, or if a Delta multiplies a state or a disturbance.
     """
 
     widenings: tuple[Widening, ...]
@@ -96,11 +100,16 @@ def calibrate(
 
     Notes
     -----
-    The cost of a widening is its size relative to the half-width of the bound (a bound of zero counts in its own unit);
-    the sum is least, so few bounds are named. A Delta that multiplies states or disturbances takes the sign that its
-    factor has along the best trajectory with every Delta at its centre; this can only make the widening larger.
-    An uncertainty of higher rank than one enters as a sum of rank-one terms, each with a Delta of its own, as in
-    `WindowObserver`.
+    The cost of a widening is its size relative to the half-width of the bound, or where that is zero to the unit of the
+    normal form, which comes from the sizes of the states, so that units of the user change nothing; the sum is least,
+    so few bounds are named. Where a Delta multiplies states or disturbances the least sum is a local one. Each
+    uncertainty has one Delta a sample, whatever its rank: a trajectory of the model itself. Observers take an
+    uncertainty of higher rank apart into terms with Deltas of their own, and how depends on units, bounds and first
+    set; so each may explain a log that asks for a widening here, but none falsifies what is explained here.
+
+    The amounts are those that the trajectory needs, followed from its first state in balls: nothing in them rests on a
+    solver. Readings are allowed 1e-9 (|y| + n) of rounding, as observers allow. Where floats cannot
+    hold a trajectory in sets without an interior, the window observer of full information is run on the log instead.
 
     Raises
     ------
@@ -108,62 +117,90 @@ def calibrate(
         For a wrong argument; for a Delta that multiplies states or disturbances (its widening is not a linear program)
         and a disturbance polytope, if they were chosen; and if no widening of the chosen bounds explains the log.
     RuntimeError
-        If the solver leaves a program undecided.
+        If the solver leaves a program undecided, or the trajectory found cannot be proven one.
     """
     if not isinstance(window, int | np.integer) or window < 2:
         raise ValueError(f"window is {window!r}; expected a number of samples >= 2")
     _check_log(model, log)
     form = NormalForm.at(model, *bounding_box("initial", initial, model.n_states))
-    chosen = bounds_of(model, bounds)
-    amounts, samples = np.zeros(len(chosen)), dict[int, int]()
-    first, start = 0, initial
+    chosen = bounds_of(form, bounds)
+    amounts = np.zeros(len(chosen))
+    pieces, first, start = list[_Piece](), 0, initial
     while True:
         count = min(int(window), len(log) - first)
-        piece = ElasticProgram(form, log, chosen, first, count, start)
-        found = piece.solve(amounts)
+        program = ElasticProgram(form, log, chosen, first, count, start)
+        found = program.solve(amounts)
         if found is None:
-            names = ", ".join(bound.name for bound in chosen) or "nothing"
-            raise ValueError(
-                f"no widening of {names} explains samples {first} to {first + count - 1}; let bounds contain 'noise'"
-            )
-        needed = np.flatnonzero(found.widenings > NEGLIGIBLE)
-        before, amounts = amounts, amounts.copy()
-        amounts[needed] += found.widenings[needed] + _ROUNDED_UP
-        for i in needed:
-            if i not in samples:
-                samples[int(i)] = first + _first_needed(piece, int(i), before, amounts, found.signs, count)
+            raise ValueError(_no_explanation(chosen, first, count, program.is_exact))
+        before, amounts = amounts, amounts + found.widenings
+        pieces.append(_Piece(program, found, first, count, before))
         if first + count == len(log):
             break
-        first, start = first + count // 2, HPolytope.box(found.x[count // 2], found.x[count // 2])
-    widenings = [_widening(chosen[i], amounts[i], samples[i]) for i in samples]
+        middle = found.x[count // 2] * form.x
+        first, start = first + count // 2, HPolytope.box(middle, middle)
+    explanation = explain(form, log, initial, chosen, _joined(pieces))
+    relative = explanation.amounts / np.array([bound.scale for bound in chosen])
+    widenings = [
+        Widening(bound.name, float(amount), _relative(bound, amount), _first_needed(i, relative, pieces))
+        for i, (bound, amount) in enumerate(zip(chosen, explanation.amounts, strict=True))
+        if amount > 0.0
+    ]
     return Calibration(
         widenings=tuple(sorted(widenings, key=lambda w: -w.relative)),
         chosen=tuple(bound.name for bound in chosen),
-        model=widened(model, chosen, amounts),
-        smallest=len(log) <= window and piece.is_exact,
+        model=explanation.model,
+        smallest=len(pieces) == 1 and program.is_exact,
     )
 
 
-def _widening(bound: Bound, amount: float, sample: int) -> Widening:
-    return Widening(bound.name, float(amount * bound.scale), float(amount), sample)
+@dataclass(frozen=True)
+class _Piece:
+    """A part of the log and its trajectory; ``before`` are the relative widenings that earlier parts need."""
+
+    program: ElasticProgram
+    found: Explained
+    first: int
+    count: int
+    before: Array
 
 
-def _first_needed(piece: ElasticProgram, bound: int, before: Array, after: Array, signs: Array, count: int) -> int:
-    """Smallest sample of a piece that the data up to it need this bound to be widened for, the others being wide."""
-    allowed = after.copy()
-    allowed[bound] = before[bound]
+def _joined(pieces: list[_Piece]) -> Trajectory:
+    """One trajectory: each piece up to the middle from which the next one goes on."""
+    ends = [following.first - piece.first for piece, following in pairwise(pieces)] + [pieces[-1].count]
+    parts = [
+        (piece.found.x[:end], piece.found.w[:end], piece.found.deltas[:end])
+        for piece, end in zip(pieces, ends, strict=True)
+    ]
+    return Trajectory(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _relative(bound: Bound, amount: float) -> float:
+    return float(amount / bound.half) if bound.half > 0.0 else np.inf
+
+
+def _first_needed(bound: int, widened: Array, pieces: list[_Piece]) -> int:
+    """First sample that this bound must be widened for, the others being as wide as they became."""
+    piece = next((p for p in pieces if p.found.widenings[bound] > NEGLIGIBLE), pieces[-1])
+    allowed = widened + _ROOM
+    allowed[bound] = piece.before[bound]
 
     def is_explained(samples: int) -> bool:
-        found = piece.solve(allowed, samples, only=bound, signs=signs)
-        return found is not None and bool(found.widenings[bound] <= NEGLIGIBLE)
+        return piece.program.alone(allowed, bound, samples, piece.found.signs) <= NEGLIGIBLE
 
     low, high = 0, 1
-    while high < count and is_explained(high):
-        low, high = high, min(2 * high, count)
+    while high < piece.count and is_explained(high):
+        low, high = high, min(2 * high, piece.count)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if is_explained(middle) else (low, middle)
-    return high - 1
+    return piece.first + high - 1
+
+
+def _no_explanation(chosen: Sequence[Bound], first: int, count: int, is_exact: bool) -> str:
+    names, which = ", ".join(bound.name for bound in chosen) or "nothing", f"samples {first} to {first + count - 1}"
+    if is_exact:
+        return f"no widening of {names} explains {which}; let bounds contain 'noise'"
+    return f"no widening of {names} that explains {which} was found; let bounds contain 'noise'"
 
 
 def _check_log(model: UncertainModel, log: Log) -> None:

@@ -2,52 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.analysis.lifted_rows import Channel, LiftedSample, evaluate, line_rows, set_rows
+from svo.analysis.elastic_bounds import Bound, Kind, known_factors, not_linear
+from svo.analysis.lifted_rows import Channel, evaluate, line_rows, set_rows
 from svo.analysis.sparse_program import Columns, SparseProgram, Terms
 from svo.checks import Array
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm, set_in
 
-Kind = Literal["noise", "disturbance", "Delta"]
-
-# Of the data, as the observers do: y = fl(C x + n) on a bound need not satisfy it. Theirs is a little wider.
-ROUNDING = 1e-9
+ROUNDING = 5e-10  # of the data: half of what `svo.analysis.explanation` allows, the other half is the solver's
 _HIGH_PRICE = 1e3
+_EXACT = 2.0**-10  # unit of readings without noise: the solver keeps to them a thousand times more closely
+# Of the sequential program: saving and cost that count as none, share of the Deltas' ranges that is worth a step.
+_WORTH_A_STEP, _NOTHING, _SHORTEST, _MOST_STEPS = 1e-2, 1e-9, 1e-2, 30
 _LARGEST = 1e18  # relative to the noise: HiGHS takes 1e20 for infinity
-_KINDS: dict[str, Kind] = {"noise": "noise", "disturbances": "disturbance", "deltas": "Delta"}
-
-
-@dataclass(frozen=True)
-class Bound:
-    """A bound that may be widened, by ``scale`` times a relative widening at either end."""
-
-    kind: Kind
-    index: int
-    name: str
-    scale: float
 
 
 @dataclass(frozen=True)
 class Explained:
-    """A solved piece: relative widenings (bounds,) beyond what was allowed, states (K, n), and the signs of each s."""
+    """A solved piece, about the normal form: relative widenings (bounds,) beyond what was allowed, states (K, n),
+    disturbances (K, nw), Deltas (K, ni), and the sign of each channel's s at each sample."""
 
     widenings: Array
     x: Array
-    signs: Array
+    w: Array
+    deltas: Array
+    signs: list[Array]
+
+    @property
+    def cost(self) -> float:
+        return float(self.widenings.sum())
 
 
 class ElasticProgram:
     """The samples first, ..., first + count - 1 of a log, from a set of first states.
 
-    Log, bounds and set are as they are given; the program is about the model's normal form.
+    Log, bounds and set are as they are given; the program is about the model's normal form. A Delta whose s are known,
+    as they have no x and w in them, is a variable of its own. That of another one has a value at each sample, or its
+    products p = Delta s are variables, one a channel, with the sign of each s fixed.
     """
 
     def __init__(
@@ -58,79 +58,113 @@ class ElasticProgram:
         self._chosen = {(bound.kind, bound.index): i for i, bound in enumerate(chosen)}
         units = {"noise": form.y, "disturbance": form.w}
         self._scales = np.array([b.scale / units[b.kind][b.index] if b.kind in units else b.scale for b in chosen])
-        self._evaluated = [evaluate(self._model, log.schedule_at(first + k)) for k in range(count)]
-        self.is_exact = all(_is_known(self._model, c) for _, channels in self._evaluated for c in channels)
+        self._samples = [_Matrices.of(self._model, log.schedule_at(first + k)) for k in range(count)]
+        for k, of in enumerate(self._samples):
+            if any(kind == "Delta" and not of.known[i] for kind, i in self._chosen):
+                raise ValueError(not_linear("a Delta", f" at sample {first + k}"))
+        self.is_exact = all(of.known.all() for of in self._samples)
 
-    def solve(
-        self, allowed: Array, samples: int | None = None, only: int | None = None, signs: Array | None = None
-    ) -> Explained | None:
-        """The least sum of relative widenings beyond ``allowed`` (bounds,), or None if nothing helps.
+    def solve(self, allowed: Array) -> Explained | None:
+        """The least sum of relative widenings beyond ``allowed`` (bounds,), or None if none is found.
 
-        ``samples`` cuts the piece short and ``only`` lets a single bound give way. The signs (samples, channels) of
-        the factors s that are not known are looked for if they are not given.
+        With Deltas whose s are not known that is a local minimum. The first values of these Deltas come from the signs
+        that their s have along the best trajectory with every Delta at its centre; where an uncertainty has several
+        channels, from the least squares over their products. The steps of a sequential linear program follow.
         """
-        count = self._count if samples is None else samples
-        if signs is None and not self.is_exact:
-            centred = self._solve(allowed, count, only, None)
-            if centred is None:
-                return None
-            signs = centred.signs
-        return self._solve(allowed, count, only, signs)
+        if self.is_exact:
+            return self._solve(allowed, self._at_centres())
+        centred = self._solve(allowed, self._at_centres(softened=True))
+        split = None if centred is None else self._solve(allowed, _Treatment(signs=centred.signs))
+        best = None if split is None else self._solve(allowed, _Treatment(split.deltas))
+        reach = 1.0
+        for _ in range(_MOST_STEPS):
+            if best is None or best.cost <= _NOTHING or reach < _SHORTEST:
+                break
+            moved = self._solve(allowed, _Treatment(best.deltas, about=best, reach=reach))
+            found = None if moved is None else self._solve(allowed, _Treatment(moved.deltas))
+            if found is not None and found.cost < (1.0 - _WORTH_A_STEP) * best.cost:
+                best, reach = found, min(1.0, 2.0 * reach)
+            else:
+                reach /= 4.0
+        return best
 
-    def _solve(self, allowed: Array, count: int, only: int | None, signs: Array | None) -> Explained | None:
-        program = SparseProgram()
+    def alone(self, allowed: Array, bound: int, samples: int, signs: list[Array]) -> float:
+        """Least relative widening of one bound that explains the first samples, for signs; inf if none does."""
+        how = self._at_centres() if self.is_exact else _Treatment(signs=signs)
+        found = self._solve(allowed, how, samples, bound)
+        return np.inf if found is None else float(found.widenings[bound])
+
+    def _at_centres(self, softened: bool = False) -> _Treatment:
+        centres = [sum(q.bounds) / 2 for q in self._model.uncertainties]
+        return _Treatment(np.tile(centres, (self._count, 1)), softened=softened)
+
+    def _solve(
+        self, allowed: Array, how: _Treatment, samples: int | None = None, only: int | None = None
+    ) -> Explained | None:
+        """The program of the first samples, with only one bound that gives way if one is named."""
+        program, count = SparseProgram(), self._count if samples is None else samples
         free = np.isin(np.arange(len(allowed)), np.arange(len(allowed)) if only is None else only)
         widening = program.columns(np.zeros(len(allowed)), np.where(free, np.inf, 0.0))
         one = program.columns(1.0, 1.0)
-        # With every Delta at its centre the chosen bounds may not suffice: then all noise gives way, at a high price.
-        common = program.columns(0.0, np.inf if signs is None and not self.is_exact else 0.0)
+        common = program.columns(0.0, np.inf if how.softened else 0.0)
         elastic = _Elastic(program, widening, allowed, common, self._chosen, self._scales)
-        lifted: list[LiftedSample] = []
+        lifted: list[_Sample] = []
         x = self._states(program)
         set_rows(program, x, self._start)
         for k in range(count):
-            lifted.append(self._sample(elastic, k, x, one, None if signs is None else signs[k]))
+            lifted.append(self._sample(elastic, k, x, one, how))
             if k + 1 < count:
                 x = self._states(program)
-                n = len(x)
-                program.rows([*lifted[-1].terms(slice(0, n)), (x, -np.eye(n))], 0.0, 0.0)
+                program.rows([*lifted[-1].terms(slice(0, len(x))), (x, -np.eye(len(x)))], 0.0, 0.0)
         cost = np.zeros(program.column_count)
         cost[widening], cost[common] = 1.0, _HIGH_PRICE
         solution = program.minimise(cost, solver="ipm")
         if solution is None:
             return None
         point = solution.point
-        found = np.array([[1.0 if c.functional @ point[s.known] >= 0 else -1.0 for c in s.channels] for s in lifted])
-        return Explained(point[widening], np.array([point[s.x] for s in lifted]) * self._form.x, found)
+        return Explained(
+            point[widening],
+            np.array([point[s.x] for s in lifted]),
+            np.array([point[s.w] for s in lifted]),
+            np.array([s.deltas(point) for s in lifted]),
+            [s.signs(point) for s in lifted],
+        )
 
     def _states(self, program: SparseProgram) -> Columns:
-        size = self._model.n_states
-        return program.columns(np.full(size, -np.inf), np.full(size, np.inf))
+        n, within = self._model.n_states, self._model.physical_range
+        if within is None:
+            return program.columns(np.full(n, -np.inf), np.full(n, np.inf))
+        return program.columns(within.lower, within.upper)
 
-    def _sample(self, elastic: _Elastic, k: int, x: Columns, one: Columns, signs: Array | None) -> LiftedSample:
-        model, program, u_now = self._model, elastic.program, self._form.inputs(self._log.u[self._first + k])
-        stack, channels = self._evaluated[k]  # what they leave out is far below the solver's tolerance
+    def _sample(self, elastic: _Elastic, k: int, x: Columns, one: Columns, how: _Treatment) -> _Sample:
+        model, program, of = self._model, elastic.program, self._samples[k]
         lower, upper, noise = model.bounds(self._log.schedule_at(self._first + k))
-        u = program.columns(u_now, u_now)
-        w = self._disturbances(elastic, lower, upper)
+        now = self._form.inputs(self._log.u[self._first + k])
+        u, w = program.columns(now, now), self._disturbances(elastic, lower, upper)
         known = np.concatenate([x, u, one, w])
+        ranges = np.array([q.bounds for q in model.uncertainties]).reshape(-1, 2)
+        channels = of.channels if how.values is None else ()
+        values = ranges.mean(axis=1) if how.values is None else how.values[k]
+        held = np.where(of.known | np.isin(np.arange(len(values)), [c.owner for c in channels]), 0.0, values)
+        moved = of.known | (how.about is not None)
+        d = program.columns(np.full(moved.sum(), -np.inf), np.full(moved.sum(), np.inf))
+        for column, i in zip(d, np.flatnonzero(moved), strict=True):
+            low, high = ranges[i] if of.known[i] else how.reach * (ranges[i] - held[i])
+            elastic.within(("Delta", int(i)), np.array([column]), float(low), float(high))
+        x_at, w_at = (np.zeros(len(x)), np.zeros(len(w))) if how.about is None else (how.about.x[k], how.about.w[k])
+        on_d = of.stacks[1:][moved] @ np.concatenate([x_at, now, [1.0], w_at])
         p = program.columns(np.full(len(channels), -np.inf), np.full(len(channels), np.inf))
-        n = model.n_states
         for q, channel in enumerate(channels):
-            column, f = p[q : q + 1], channel.functional
-            if _is_known(model, channel):
-                s = float(f[n:] @ np.concatenate([u_now, [1.0], np.zeros(len(w))]))
-                low, high = sorted((channel.lo * s, channel.hi * s))
-                elastic.within(("Delta", channel.owner), column, low, high, abs(s))
-            elif signs is None:
-                centre = (channel.lo + channel.hi) / 2
-                program.rows([(column, np.ones((1, 1))), (known, -centre * f[None, :])], 0.0, 0.0)
-            else:
-                program.rows([(known, signs[q] * f[None, :])], 0.0, np.inf)
-                line_rows(program, channel, known, column, *((0.0, np.inf) if signs[q] > 0 else (-np.inf, 0.0)))
-        nothing = np.zeros(0, dtype=np.int64), np.zeros((len(stack), 0))
-        lifted = LiftedSample(x, w, known, stack, channels, p, noise, *nothing)
-        read = self._log.y[self._first + k]
+            positive = how.signs is None or how.signs[k][q] > 0.0
+            program.rows([(known, (1.0 if positive else -1.0) * channel.functional[None, :])], 0.0, np.inf)
+            line_rows(program, channel, known, p[q : q + 1], *((0.0, np.inf) if positive else (-np.inf, 0.0)))
+        stack = of.stacks[0] + np.tensordot(held, of.stacks[1:], axes=1)
+        sample = _Sample(x, w, known, stack, of, ranges, held, moved, d, on_d.T, p)
+        self._measure(elastic, k, sample, noise)
+        return sample
+
+    def _measure(self, elastic: _Elastic, k: int, sample: _Sample, noise: Array) -> None:
+        read, n = self._log.y[self._first + k], self._model.n_states
         y = self._form.outputs(read)
         for i in np.flatnonzero(~np.isnan(y)):
             if abs(float(y[i])) / (float(noise[i]) or 1.0) > _LARGEST:
@@ -139,16 +173,88 @@ class ElasticProgram:
                     "noise; no program can hold that, so where it stands for a missing measurement, leave the cell "
                     "empty (NaN)"
                 )
-            elastic.measure(int(i), lifted.terms(slice(n + i, n + i + 1)), float(y[i]), float(noise[i]))
-        return lifted
+            elastic.measure(int(i), sample.terms(slice(n + i, n + i + 1)), float(y[i]), float(noise[i]))
 
     def _disturbances(self, elastic: _Elastic, lower: Array, upper: Array) -> Columns:
         w = elastic.program.columns(np.full_like(lower, -np.inf), np.full_like(upper, np.inf))
         for j in range(len(w)):
-            elastic.within(("disturbance", j), w[j : j + 1], lower[j], upper[j], 1.0)
+            elastic.within(("disturbance", j), w[j : j + 1], lower[j], upper[j])
         if self._model.disturbance_polytope is not None:
             set_rows(elastic.program, w, self._model.disturbance_polytope)
         return w
+
+
+@dataclass(frozen=True)
+class _Treatment:
+    """How Deltas enter a program where their s are not known: at ``values`` (K, ni), or if there are none, by products
+    p of s with ``signs`` (of each channel at each sample).
+
+    ``about`` a trajectory with these values, the Deltas move within ``reach`` of their range, times the s that it has.
+    ``softened``, all noise gives way at a high price: at these values the chosen bounds may not suffice.
+    """
+
+    values: Array | None = None
+    signs: list[Array] | None = None
+    about: Explained | None = None
+    reach: float = 0.0
+    softened: bool = False
+
+
+@dataclass(frozen=True)
+class _Matrices:
+    """Those of a sample: stacks (1 + ni, n + ny, n + nu + 1 + nw), whether the s of each Delta are known (ni,), and
+    the channels of the others that have a range."""
+
+    stacks: Array
+    known: NDArray[np.bool_]
+    channels: tuple[Channel, ...]
+
+    @classmethod
+    def of(cls, model: UncertainModel, schedule: Any) -> _Matrices:
+        stacks = model.stack(schedule)
+        known = known_factors(model, stacks)
+        # What they leave out is far below the solver's tolerance, and nothing is concluded from them alone.
+        channels = tuple(c for c in evaluate(model, schedule)[1] if not known[c.owner])
+        return cls(stacks, known, channels)
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """A sample in a program: Deltas (ni,) are ``held`` in the stack, and those that are ``moved`` add d to that; the
+    products p of the others are variables."""
+
+    x: Columns
+    w: Columns
+    known: Columns
+    stack: Array
+    of: _Matrices
+    ranges: Array
+    held: Array
+    moved: NDArray[np.bool_]
+    d: Columns
+    on_d: Array
+    p: Columns
+
+    def terms(self, rows: slice) -> Terms:
+        """The rows of [x(k+1); y(k)] as terms of a program."""
+        gains = np.array([c.gain for c in self.of.channels[: len(self.p)]]).reshape(-1, len(self.stack)).T
+        return [(self.known, self.stack[rows]), (self.d, self.on_d[rows]), (self.p, gains[rows])]
+
+    def signs(self, point: Array) -> Array:
+        """Of the s of each channel."""
+        return np.array([1.0 if c.functional @ point[self.known] >= 0.0 else -1.0 for c in self.of.channels])
+
+    def deltas(self, point: Array) -> Array:
+        """Each Delta (ni,): where its products are variables, the one that fits them best."""
+        found, over = self.held.copy(), np.zeros((2, len(self.held)))
+        found[self.moved] += point[self.d]
+        for channel, p in zip(self.of.channels, point[self.p], strict=False):
+            s, weight = float(channel.functional @ point[self.known]), float(channel.gain @ channel.gain)
+            over[:, channel.owner] += weight * p * s, weight * s * s
+        split = np.isin(np.arange(len(found)), [c.owner for c in self.of.channels[: len(self.p)]])
+        fit = np.divide(over[0], over[1], out=np.zeros(len(found)), where=over[1] > 0.0)
+        found[split] = np.clip(fit, *self.ranges.T)[split]
+        return found
 
 
 @dataclass(frozen=True)
@@ -162,14 +268,14 @@ class _Elastic:
     chosen: dict[tuple[Kind, int], int]
     scales: Array
 
-    def within(self, key: tuple[Kind, int], column: Columns, lower: float, upper: float, factor: float) -> None:
-        """A variable between two bounds, each of which moves by ``factor`` times the widening."""
+    def within(self, key: tuple[Kind, int], column: Columns, lower: float, upper: float) -> None:
+        """A variable between two bounds, each of which moves by the widening."""
         variable = (column, np.ones((1, 1)))
         if key not in self.chosen:
             self.program.rows([variable], lower, upper)
             return
         i = self.chosen[key]
-        step = factor * self.scales[i]
+        step = self.scales[i]
         more, less = self._widening(i, step)
         self.program.rows([variable, more], lower - step * self.allowed[i], np.inf)
         self.program.rows([variable, less], -np.inf, upper + step * self.allowed[i])
@@ -180,7 +286,7 @@ class _Elastic:
         i = self.chosen.get(("noise", sensor))
         if i is not None:
             width += self.scales[i] * self.allowed[i]
-        unit = noise or 1.0  # rows of about size one, for the solver's absolute tolerance
+        unit = noise or _EXACT  # rows of about size one, for the solver's absolute tolerance
         row = [(columns, matrix / unit) for columns, matrix in terms]
         above, below = [*row, (self.common, np.ones((1, 1)))], [*row, (self.common, -np.ones((1, 1)))]
         if i is not None:
@@ -192,83 +298,3 @@ class _Elastic:
     def _widening(self, i: int, step: float) -> tuple[tuple[Columns, Array], tuple[Columns, Array]]:
         column = self.widening[i : i + 1]
         return (column, np.full((1, 1), step)), (column, np.full((1, 1), -step))
-
-
-def bounds_of(model: UncertainModel, wanted: Sequence[str]) -> tuple[Bound, ...]:
-    """The bounds that are meant by kinds ("noise", "disturbances", "deltas") and names ("noise alpha").
-
-    Raises
-    ------
-    ValueError
-        For an unknown name, a disturbance polytope, and a Delta that multiplies states or disturbances.
-    """
-    every = _every_bound(model)
-    for name in wanted:
-        if name not in _KINDS and name not in {bound.name for bound in every}:
-            known = ", ".join([*_KINDS, *(bound.name for bound in every)])
-            raise ValueError(f"bounds contains {name!r}; expected any of {known}")
-    chosen = tuple(b for b in every if b.name in wanted or any(_KINDS.get(name) == b.kind for name in wanted))
-    if model.disturbance_polytope is not None and any(b.kind == "disturbance" for b in chosen):
-        raise ValueError(
-            "bounds contains disturbances, but w is a polytope; give it as a box, or leave the disturbances out"
-        )
-    _, channels = evaluate(model, model.schedule)
-    for bound in chosen:
-        if bound.kind == "Delta" and not all(_is_known(model, c) for c in channels if c.owner == bound.index):
-            raise ValueError(
-                f"bounds contains {bound.name}, which multiplies states or disturbances: its widening is not a linear "
-                "program; leave it out"
-            )
-    return chosen
-
-
-def widened(model: UncertainModel, chosen: Sequence[Bound], amounts: Array) -> UncertainModel:
-    """The model with bounds widened by relative amounts (bounds,)."""
-    extra = {(b.kind, b.index): float(b.scale * a) for b, a in zip(chosen, amounts, strict=True) if a > 0.0}
-    changes: dict[str, Any] = {}
-    noise = np.array([extra.get(("noise", i), 0.0) for i in range(model.n_outputs)])
-    if noise.any():
-        changes["n"] = _shifted(model, 2, noise)
-    w = np.array([extra.get(("disturbance", j), 0.0) for j in range(model.n_disturbances)])
-    if w.any():
-        changes["w"] = (_shifted(model, 0, -w), _shifted(model, 1, w))
-    if any(kind == "Delta" for kind, _ in extra):
-        more = [extra.get(("Delta", i), 0.0) for i in range(len(model.uncertainties))]
-        changes["uncertainties"] = [
-            replace(q, bounds=(q.bounds[0] - m, q.bounds[1] + m))
-            for q, m in zip(model.uncertainties, more, strict=True)
-        ]
-    return model.replace(**changes)
-
-
-def _shifted(model: UncertainModel, which: int, shift: Array) -> Array | Callable[[Any], Array]:
-    """One of `UncertainModel.bounds`, moved; a function of the schedule if the model is scheduled."""
-    if model.is_scheduled:
-        return lambda schedule: model.bounds(schedule)[which] + shift
-    return model.bounds()[which] + shift
-
-
-def _every_bound(model: UncertainModel) -> list[Bound]:
-    lower, upper, noise = model.bounds(model.schedule)
-    deltas = [q.bounds for q in model.uncertainties]
-    groups: list[tuple[Kind, Sequence[str], Sequence[float]]] = [
-        ("noise", _names(model, "outputs", len(noise)), noise.tolist()),
-        ("disturbance", _names(model, "disturbances", len(lower)), ((upper - lower) / 2).tolist()),
-        ("Delta", [q.name or str(i) for i, q in enumerate(model.uncertainties)], [(hi - lo) / 2 for lo, hi in deltas]),
-    ]
-    return [
-        Bound(kind, i, f"{kind} {name}", float(half) or 1.0)
-        for kind, names, halves in groups
-        for i, (name, half) in enumerate(zip(names, halves, strict=True))
-    ]
-
-
-def _names(model: UncertainModel, key: str, size: int) -> Sequence[str]:
-    given = (model.names or {}).get(key)
-    return given if given is not None else [str(i) for i in range(size)]
-
-
-def _is_known(model: UncertainModel, channel: Channel) -> bool:
-    """Whether s = f'(x, u, 1, w) has no x and w in it."""
-    n, nu = model.n_states, model.n_inputs
-    return not np.any(np.delete(channel.functional, np.s_[n : n + nu + 1]))

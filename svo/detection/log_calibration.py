@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal, localcontext
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ class LogCalibration:
                 {
                     "bound": w.bound,
                     "amount": w.amount,
-                    "relative": w.relative,
+                    "relative": w.relative if isfinite(w.relative) else None,
                     "sample": w.sample,
                     "time_s": float(self.time[w.sample]),
                 }
@@ -52,11 +53,15 @@ class LogCalibration:
             return f"Nothing to widen: the nominal model explains {samples}."
         kind = "The smallest" if self.result.smallest else "A sufficient"
         lines = [
-            f"    {w.bound}: + {rounded_up(w.amount, 4)} ({rounded_up(100 * w.relative, 3)} % of the bound), "
+            f"    {w.bound}: + {rounded_up(w.amount, 4)} ({_share(w.relative)}), "
             f"first needed at {self.time[w.sample]:g} s (sample {w.sample})"
             for w in self.result.widenings
         ]
         return "\n".join([f"{kind} widening with which the nominal model explains {samples}, in model units:", *lines])
+
+
+def _share(relative: float) -> str:
+    return f"{rounded_up(100 * relative, 3)} % of the bound" if isfinite(relative) else "the bound is zero"
 
 
 def rounded_up(value: float, digits: int) -> str:

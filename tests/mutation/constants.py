@@ -43,8 +43,7 @@ SETS = "tests/polytopes"
 CONSTANTS = (
     Constant("svo.models.discretisation", "_ROUNDED_UP", "outward", "tests/svo/models/test_inside_a_sample.py"),
     Constant("svo.analysis.reachable_set", "_ROUNDING", "outward", "tests/svo/analysis/test_reachable_set.py"),
-    Constant("svo.analysis.calibration", "_ROUNDED_UP", "outward", "tests/svo/analysis/test_calibration.py"),
-    Constant("svo.analysis.elastic_program", "ROUNDING", "outward", "tests/svo/analysis/test_calibration.py"),
+    Constant("svo.analysis.explanation", "ROUNDING", "outward", "tests/svo/analysis/test_calibration.py"),
     Constant("svo.models.state_range", "_EPS", "outward", ROUNDED),
     Constant("svo.observers.zonotope.zonotope", "EPS", "outward", CORE),
     Constant("svo.observers.polytope.vertex_images", "_OUTWARD", "outward", ROUNDED),
@@ -62,7 +61,6 @@ CONSTANTS = (
     Constant("polytopes.preimage", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.emptiness", "_EPS", "outward", ROUNDED),
     Constant("svo.logs.columns", "TIME_TOLERANCE", "tolerance", "tests/svo/logs/test_log_file.py"),
-    Constant("svo.analysis.calibration", "NEGLIGIBLE", "tolerance", "tests/svo/analysis/test_calibration.py"),
     Constant(
         "svo.analysis.model_pair", "LEAST_SEPARATION", "tolerance", "tests/svo/analysis/test_distinguishability.py"
     ),
@@ -70,6 +68,9 @@ CONSTANTS = (
     Constant("svo.baselines.kalman", "_STABLE", "tolerance", "tests/svo/baselines/test_filters.py"),
     Constant("svo.baselines.kalman", "_UNSEEN", "tolerance", "tests/svo/baselines/test_filters.py"),
     Constant("svo.baselines.parity", "_TRACE", "tolerance", "tests/svo/baselines/test_parity.py"),
+    Constant("svo.analysis.elastic_program", "ROUNDING", "heuristic"),
+    Constant("svo.analysis.explanation", "NEGLIGIBLE", "heuristic"),
+    Constant("svo.analysis.explanation", "_PULL", "heuristic"),
     Constant("svo.analysis.input_design", "_DECREASE", "heuristic"),
     Constant("svo.analysis.sparse_program", "FEASIBILITY", "heuristic"),
     Constant("svo.analysis.model_pair", "_DELTA_TOLERANCE", "heuristic"),

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from polytopes import HPolytope
-from svo import Log, UncertainModel, Uncertainty, WindowObserver, calibrate
+from svo import Calibration, Log, UncertainModel, Uncertainty, WindowObserver, calibrate
 from svo.cli import app
 from svo.detection.log_calibration import rounded_up
+from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
+from tests.svo.observers.other_units import Units
 from tests.svo.observers.random_plants import random_plant
 
 Array = NDArray[np.float64]
@@ -115,23 +117,128 @@ def test_a_long_log_is_explained_by_one_trajectory_in_pieces() -> None:
     assert is_explained(found.model, log)
 
 
-SHORT = pytest.mark.xfail(
-    strict=True, raises=AssertionError, reason="A16: some widenings are up to 1 % too small with uncertainties"
-)
-
-
-@pytest.mark.parametrize("seed", [*range(531, 556), *(pytest.param(seed, marks=SHORT) for seed in (505, 521, 530))])
-def test_whatever_the_plant_the_widened_model_explains_the_log(seed: int) -> None:
+def random_case(seed: int) -> tuple[UncertainModel, HPolytope, Log]:
+    """A random plant and a healthy log at the corners of every bound, but for one reading that is off by 3."""
     rng = np.random.default_rng(seed)
     plant = random_plant(rng, largest=3)
     start = HPolytope.box(-np.ones(plant.n_states), np.ones(plant.n_states))
     u = rng.normal(size=(12, plant.n_inputs))
     log = plant.simulate(rng.uniform(-1, 1, plant.n_states), u, rng, corners=True)
     sensor = int(rng.integers(plant.n_outputs))
-    log = disturbed(log, int(rng.integers(12)), sensor, 3.0)
+    return plant, start, disturbed(log, int(rng.integers(12)), sensor, 3.0)
+
+
+def typed_in(plant: UncertainModel, found: Calibration) -> UncertainModel:
+    """The model with the printed figures added to its noise, as a user would."""
+    n = plant.bounds()[2].copy()
+    for w in found.widenings:
+        n[int(w.bound.split()[1])] += float(rounded_up(w.amount, 4))
+    return plant.replace(n=n)
+
+
+def check_explained(seed: int) -> None:
+    plant, start, log = random_case(seed)
     found = calibrate(plant, log, start, bounds=["noise"])
-    assert is_explained(found.model, log, start)
     assert all(w.amount > 0 for w in found.widenings)
+    for wider in (found.model, typed_in(plant, found)):
+        assert is_explained(wider, log, start), seed
+
+
+# In 505, 521 and 530 an uncertainty of rank two came apart in one way here and in another in the widened model.
+@pytest.mark.parametrize("seed", [505, 521, 530, *range(531, 551)])
+def test_whatever_the_plant_the_widened_model_explains_the_log(seed: int) -> None:
+    check_explained(seed)
+
+
+@pytest.mark.slow
+def test_200_widened_plants_explain_their_logs() -> None:
+    for seed in range(500, 700):
+        check_explained(seed)
+
+
+@pytest.mark.parametrize("seed", [514, 521, 530])
+def test_what_explains_a_log_does_so_for_observers_in_all_units_and_of_all_kinds(seed: int) -> None:
+    """They take an uncertainty of rank two apart in different ways; a trajectory of the model is in all their sets."""
+    plant, start, log = random_case(seed)
+    wider = calibrate(plant, log, start, bounds=["noise"]).model
+    rng = np.random.default_rng(seed)
+    for k in range(2):
+        units = Units.random(rng, wider, 4)
+        y = units.log(log)
+        for observer in (
+            WindowObserver(units.model(wider), units.set("x", start), horizon=None if k else 3),
+            ConstrainedZonotopeObserver(units.model(wider), units.set("x", start)),
+        ):
+            assert "falsified" not in observer.run(y).verdicts
+
+
+@pytest.mark.parametrize("seed", [802, 804, 807, 811, 812])
+def test_a_healthy_log_of_an_uncertain_plant_needs_no_widening(seed: int) -> None:
+    """With signs of s taken from Deltas at their centre alone, noise of up to 3.8 times its bound was asked for."""
+    rng = np.random.default_rng(seed)
+    plant = random_plant(rng, largest=3)
+    start = HPolytope.box(-np.ones(plant.n_states), np.ones(plant.n_states))
+    u = rng.normal(size=(12, plant.n_inputs))
+    log = plant.simulate(rng.uniform(-1, 1, plant.n_states), u, rng, corners=True)
+    assert calibrate(plant, log, start, bounds=["noise"]).widenings == ()
+
+
+@pytest.mark.parametrize("beyond", [1e-8, 3e-8, 1e-5])
+def test_no_widening_is_too_small_to_be_named(beyond: float) -> None:
+    exact = model(w=[0.0, 0.0])
+    log = Log(time=np.arange(5.0), u=np.zeros((5, 1)), y=np.zeros((5, 2)))
+    log.y[3, 1] = 0.2 * (1.0 + beyond)
+    at_rest = HPolytope.box([0.0, 0.0], [0.0, 0.0])
+    assert not is_explained(exact, log, at_rest)
+    found = calibrate(exact, log, at_rest, bounds=["noise"])
+    assert [w.bound for w in found.widenings] == ["noise flow"]
+    assert 0.5 * beyond <= found.widenings[0].relative <= beyond
+    assert is_explained(found.model, log, at_rest)
+
+
+def test_bounds_of_zero_are_measured_by_the_plant_and_not_by_its_units() -> None:
+    plant = model(n=[0.0, 0.2], w=[0.01, 0.0])
+    log = disturbed(healthy(plant), 31, 1, 0.9)
+    units = Units(np.array([20, -30]), np.array([7]), np.array([20, -30]), np.array([-11, 40]))
+    a = calibrate(plant, log, START)
+    b = calibrate(units.model(plant), units.log(log), units.set("x", START))
+    assert [(w.bound, w.sample) for w in a.widenings] == [(w.bound, w.sample) for w in b.widenings]
+    scale = {"noise level": 20, "noise flow": -30, "disturbance rain": -11, "disturbance leak": 40}
+    for one, two in zip(a.widenings, b.widenings, strict=True):
+        assert np.ldexp(one.amount, scale[one.bound]) == pytest.approx(two.amount, rel=1e-6)
+        assert one.relative == pytest.approx(two.relative, rel=1e-6)
+    assert is_explained(a.model, log)
+    gusts = calibrate(plant, log, START, bounds=["disturbances"]).widenings
+    assert {w.bound: w.relative for w in gusts}["disturbance leak"] == np.inf
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"w": HPolytope([[1, 1], [-1, 0], [0, -1]], [0.01, 0.005, 0.005])},
+        {"physical": ([-1.0, -1.0], [2.0, 2.0])},
+        {"A": [[1.05, 0.1], [0.0, 0.8]]},
+    ],
+)
+def test_the_trajectory_keeps_to_sets_of_w_and_of_states_and_to_unstable_models(
+    changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant = model(**changes)
+    log = disturbed(healthy(plant, samples=70), 31, 1, 0.9)
+    with monkeypatch.context() as patch:
+        patch.setattr("svo.analysis.explanation.WindowObserver", None)  # the trajectory is proof enough
+        found = calibrate(plant, log, START, bounds=["noise"], window=30)
+    assert [w.bound for w in found.widenings] == ["noise flow"]
+    assert is_explained(found.model, log)
+
+
+def test_where_no_float_is_in_a_set_the_observer_decides() -> None:
+    """First states on the line x0 = x1 / 3, which holds next to no pair of floats."""
+    line = HPolytope([[0, 1], [0, -1]], [1.0, -0.1], [[1.0, -1.0 / 3.0]], [0.0])
+    log = disturbed(model().simulate([0.1, 0.3], np.full((20, 1), 0.3), np.random.default_rng(0)), 7, 1, 0.9)
+    found = calibrate(model(), log, line)
+    assert [w.bound for w in found.widenings] == ["noise flow"]
+    assert is_explained(found.model, log, line)
 
 
 def test_missing_sensors_and_scheduled_bounds() -> None:
