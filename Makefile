@@ -4,9 +4,12 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= demo
 STUDY  := $(OUT)/eclipse
-PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
 
-.PHONY: demo test test-slow test-browser test-packaging bench docs lint clean
+# Modules are compiled when they are first imported (most never are), and kept.
+export PYTHONDONTWRITEBYTECODE :=
+
+.PHONY: demo test kernels test-slow test-browser test-packaging bench docs lint clean
 
 # The isolation-time study of the Eclipse with both noise sets, then a check of every alarm's proof.
 demo: $(VENV)/.study
@@ -15,11 +18,13 @@ demo: $(VENV)/.study
 	$(BIN)/svo verify $(STUDY)/alarms.jsonl
 	@echo "Open $(STUDY)/report.html in a browser; everything else is beside it."
 
-# Linter and types while the kernels compile, then the tests.
-test: $(VENV)/.dev
-	@$(BIN)/python -m tests.compiled & compiling=$$!; \
-	  $(MAKE) --no-print-directory lint || { kill $$compiling; exit 1; }; wait $$compiling
+# The kernels compile while the tests' own needs install and the linter runs; then the tests.
+test:
+	@$(MAKE) --no-print-directory --jobs=2 kernels lint
 	$(BIN)/python -m pytest -n 2
+
+kernels: $(VENV)/.core
+	$(BIN)/python -m tests.compiled
 
 # The long checks, an hour of CPU in named groups (make test-slow GROUPS="soundness polytopes"); a stopped run goes on.
 test-slow: $(VENV)/.dev
@@ -53,15 +58,20 @@ $(BIN)/python:
 	  { echo "Python 3.11 or later is needed; name one: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
+$(VENV)/.core: pyproject.toml | $(BIN)/python
+	@echo "Installing the toolbox into $(VENV) (about a minute)"
+	$(PIP) .
+	@touch $@
+
 $(VENV)/.study: pyproject.toml | $(BIN)/python
 	@echo "Installing what the study needs into $(VENV) (about a minute)"
 	$(PIP) '.[study]'
 	@touch $@
 
-$(VENV)/.dev: pyproject.toml | $(BIN)/python
+$(VENV)/.dev: $(VENV)/.core
 	@echo "Installing what the tests need into $(VENV) (about a minute)"
-	$(PIP) '.[study,cluster,compare,dev]'
-	@$(PIP) '.[cdd]' || echo "No pycddlib for this machine: its tests will be skipped"
+	@$(PIP) '.[study,cluster,compare,dev,cdd]' || { \
+	  echo "No pycddlib for this machine: its tests will be skipped"; $(PIP) '.[study,cluster,compare,dev]'; }
 	@touch $@ $(VENV)/.study
 
 $(VENV)/.docs: pyproject.toml | $(BIN)/python
