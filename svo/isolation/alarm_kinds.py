@@ -172,11 +172,18 @@ def _window_difference(c: WindowCertificate, last: int, log: Log) -> str | None:
     if samples[0] < 0:
         return f"samples {samples[0]} to {last} do not belong to a log of {len(log)} samples"
     for k, sample in zip(samples, c.samples, strict=True):
-        driven = k < last or bool(np.any(sample.stack[:, c.n :, c.n : c.n + sample.u.size]))
+        driven = k < last or _takes_part(sample, c.n)
         difference = output_difference(k, sample.y, sample.u, driven, log)
         if difference is not None:
             return difference
     return None
+
+
+def _takes_part(newest: WindowSample, n: int) -> bool:
+    """Whether the newest input does: it enters the output, or an uncertainty that it drives does."""
+    on_u, on_y = newest.stack[:, :, n : n + newest.u.size], newest.stack[1:, n:]
+    shared = on_u[1:].any(axis=(1, 2)) & on_y.any(axis=(1, 2))
+    return bool(on_u[:, n:].any() or shared.any())
 
 
 def _window_model(c: WindowCertificate) -> tuple[ModelSample, ...]:

@@ -25,7 +25,7 @@ from svo.models.along import along
 from svo.models.bounds import Bounds, bounds_of
 from svo.models.mat import read_arrays
 from svo.models.simulation import simulate
-from svo.models.stack import OUTPUT_BLOCKS, STATE_BLOCKS, Layout, ScheduledBlock, Stack
+from svo.models.stack import OUTPUT_BLOCKS, STATE_BLOCKS, Layout, ScheduledBlock, Stack, may_be_nonzero
 from svo.models.state_range import StateRange, start_range, state_range
 from svo.models.statespace import state_space
 from svo.models.uncertainty import Schedulable, Uncertainty
@@ -147,7 +147,7 @@ class UncertainModel:
     @property
     def uses_input_in_output(self) -> bool:
         """Whether y(k) depends on u(k), so that a step needs ``u_next``."""
-        return self.D is not None or any(u.D is not None for u in self.uncertainties)
+        return may_be_nonzero(self.D, *(u.D for u in self.uncertainties))
 
     @property
     def disturbance_polytope(self) -> HPolytope | None:

@@ -16,6 +16,11 @@ STATE_BLOCKS = ("A", "B", "a", "E")
 OUTPUT_BLOCKS = ("C", "D", "c", "F")
 
 
+def may_be_nonzero(*arrays: Any) -> bool:
+    """Whether any of a model's arrays is there and not zero; a function of the schedule may be anything."""
+    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
+
+
 @dataclass(frozen=True)
 class Layout:
     """Where the blocks stand in a stacked sample."""

@@ -38,7 +38,7 @@ def inputs_shaped(model: UncertainModel, name: str, u: ArrayLike | None, needed:
     if not needed or (u is None and size == 0):
         return np.zeros(size)
     if u is None:
-        why = ", since D, a D_i or a channel shares it with the output" if name != "u" else ""
+        why = ", since D or a D_i is not zero, or an uncertainty of B reaches the output" if name != "u" else ""
         raise ValueError(f"{name} is missing; expected shape ({size},){why}")
     array = floats(name, u)
     if array.shape != (size,):

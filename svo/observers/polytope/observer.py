@@ -15,6 +15,7 @@ from svo.checks import Array, is_count, is_finite_number
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm, set_in
+from svo.models.stack import may_be_nonzero
 from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at, steps_of
 from svo.observers.polytope.limits import readable, within_physical
 from svo.observers.polytope.restart import RestartingPolytope
@@ -30,7 +31,7 @@ from svo.observers.polytope.state import (
 from svo.observers.polytope.step import PolytopeRecord, PolytopeStep
 from svo.observers.readings import NO_SAMPLE
 from svo.observers.saved_state import check_model, check_unchanged, last_schedule, sealed
-from svo.observers.window.setup import finite_box, may_be_nonzero
+from svo.observers.window.setup import finite_box
 
 _PUBLISHED_STACKS = 4096
 

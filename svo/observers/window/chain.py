@@ -184,7 +184,7 @@ class ProvingObserver(WindowObserver):
         clock, size, decided = self._arrays["clock"], self._size, False
         base, time = int(clock[kernel.BASE]), int(clock[kernel.TIME])
         for program in range(*kernel.arrival_programs.py_func(size, base, time)):
-            verdict, _ = kernel.solve(self._window, size, task, program, program + 1, kernel.PIVOT_LIMIT)
+            verdict = self._solve_one(task, program)
             if verdict == kernel.EMPTY_CANDIDATE and self._prove():
                 return "falsified"
             decided = decided or verdict == kernel.CONSISTENT
@@ -192,19 +192,18 @@ class ProvingObserver(WindowObserver):
                 self._check_arrival(program, base + size.block)
         return "consistent" if decided else self._ask_highs()
 
-    def _settle_channels(self, sign_open: bool) -> None:
-        """As the observer does, one program at a time; each bound of s is then proven."""
+    def _settle_channels(self, sign_open: bool, reaching: bool, end: float | None = None) -> None:
+        """As the observer does; each bound of s is then proven."""
         size, w = self._size, self._arrays
-        time = int(w["clock"][kernel.TIME])
-        if not size.late and self._last_bounds is None:
-            return  # the first sample opens no channel
-        v = time % (size.N + size.late)
-        for q in range(size.nq):
+        if not reaching and self._last_bounds is None:
+            return  # no transition leads to the first sample
+        v = self._time % (size.N + size.late)
+        for q in self._channels(reaching):
             for side in range(2):
                 program = 2 * q + side
                 is_open = sign_open and w["s_lower"][v, q] < 0.0 < w["s_upper"][v, q]
                 if is_open:
-                    kernel.solve(self._window, size, kernel.CHANNELS, program, program + 1, kernel.PIVOT_LIMIT)
+                    self._solve_one(kernel.CHANNELS, program)
                 self._check_channel(v, q, side, 4 * size.nt + program if is_open else None)
 
     def _check_arrival(self, program: int, target: int) -> None:

@@ -64,7 +64,7 @@ class WindowSample:
         ``y`` within ``noise + slack`` of the output; NaN where the sensor is missing.
     w_lower, w_upper : (nw,)
     s_lower, s_upper : (nq,)
-        Bounds of each channel's s.
+        Bounds of each channel's s; zero at the newest sample where the channel does not reach the output.
     lines : (nq, 4)
         Slope and intercept of the line above Delta s and of the line below it.
     on_output, on_w, on_channel : (ny,), (nh,), (nq, 2)
@@ -107,7 +107,8 @@ class WindowCertificate:
         Multipliers of the arrival rows.
     samples : tuple of WindowSample
     late : bool
-        Whether w and the channels of the last sample take part (they do where the output depends on them).
+        Whether w of the last sample takes part, and its channels that reach the output: where the output may depend on
+        any of them.
     largest_at : int or None
         Sample at which the observer's set started again from the model's largest set, a premise of the arrival set.
     units : Exponents or None

@@ -70,20 +70,16 @@ class WindowPrograms(WindowMemory):
             data, injected = self._inject(data)
         code = kernel.enter(*_of_one_layout(data))
         self._check_entry(code, given)
+        self._settle_channels(code == kernel.SIGN_OPEN, False, end)
+        code = kernel.move(*data[:3])
         w, s = self._arrays, self._time % (self._size.N + 1)
-        if self._injection is not None:  # it is for outputs that w enters, where the clock has moved on by now
+        if self._injection is not None:
             w["given.stack"][s], w["given.y"][s], w["given.injected"][s] = given[6], given[5], injected
             w["given.slack"][s] = 0.0
-        if end is None:
-            self._settle_channels(code == kernel.SIGN_OPEN)
-        elif code == kernel.SIGN_OPEN:
-            v = self._time % (self._size.N + self._size.late)
-            for program in range(2 * self._size.nq):
-                if w["s_lower"][v, program // 2] < 0.0 < w["s_upper"][v, program // 2]:
-                    self._solve_in_portions(kernel.CHANNELS, program, end)
+        self._settle_channels(code == kernel.SIGN_OPEN, True, end)
         if injected:
             self._widen(given)
-        if not kernel.complete(*data[:3], self.eps):
+        if not kernel.complete(*data[:2], self.eps):
             raise Outgrown
         if self._injection is not None and not injected:
             w["given.slack"][s] = w["slack"][s]
@@ -112,10 +108,27 @@ class WindowPrograms(WindowMemory):
         if code in ENTRY_ERRORS:
             raise ValueError(ENTRY_ERRORS[code].format(u=data[3] * self._form.u, y=data[5] * self._form.y))
 
-    def _settle_channels(self, sign_open: bool) -> None:
-        """Tighten the bounds of those s whose sign is open."""
-        if sign_open:
-            self._solve(kernel.CHANNELS)
+    def _channels(self, reaching: bool) -> list[int]:
+        """Those of the newest sample that reach the output, or those that do not."""
+        gain = self._arrays["gain"][self._time % (self._size.N + self._size.late)]
+        found: list[int] = np.flatnonzero(gain[:, self._size.n :].any(axis=1) == reaching).tolist()
+        return found
+
+    def _settle_channels(self, sign_open: bool, reaching: bool, end: float | None = None) -> None:
+        """Tighten the bounds of those s whose sign is open, of the channels that reach the output or of the others."""
+        w, v = self._arrays, self._time % (self._size.N + self._size.late)
+        for q in self._channels(reaching) if sign_open else ():
+            for program in (2 * q, 2 * q + 1):
+                if not w["s_lower"][v, q] < 0.0 < w["s_upper"][v, q]:
+                    continue
+                if end is None:
+                    self._solve_one(kernel.CHANNELS, program)
+                else:
+                    self._solve_in_portions(kernel.CHANNELS, program, end)
+
+    def _solve_one(self, task: int, program: int) -> int:
+        """What one program of a task says."""
+        return int(kernel.solve(self._window, self._size, task, program, program + 1, kernel.PIVOT_LIMIT)[0])
 
     def _solve(self, task: int) -> VerdictName:
         """Solve the programs of a task; an empty window counts only once its certificate is proven."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,6 +9,7 @@ from polytopes import HPolytope
 from svo.checks import Array, real_array
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
+from svo.models.stack import may_be_nonzero
 from svo.models.state_range import StateRange
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window_kernel import channel_count
@@ -38,23 +37,18 @@ def channel_owners(model: UncertainModel) -> NDArray[np.int64]:
     return np.array(owners, dtype=np.int64)
 
 
-def may_be_nonzero(*arrays: Any) -> bool:
-    """Whether any of a model's arrays is there and not zero; a function of the schedule may be anything."""
-    return any(callable(array) or (array is not None and bool(np.any(array))) for array in arrays)
-
-
 def output_is_disturbed(model: UncertainModel) -> bool:
     """Whether w or a channel may enter the output, at whatever schedule."""
     return may_be_nonzero(model.F, *(array for u in model.uncertainties for array in (u.C, u.D, u.c, u.F)))
 
 
 def needs_next_input(model: UncertainModel) -> bool:
-    """Whether a step needs u(k+1), for an observer whose output and state share w and the channels.
+    """Whether a step needs u(k+1), for an observer whose output and state share each Delta.
 
-    Channels that the output may share are bounded at its sample, so what u says of them must be known then.
+    Where a Delta of B is also one of the output, y(k+1) tells of the Delta that acts on u(k+1).
     """
-    driven = may_be_nonzero(*(u.B for u in model.uncertainties))
-    return model.uses_input_in_output or (output_is_disturbed(model) and driven)
+    shared = (may_be_nonzero(u.B) and may_be_nonzero(u.C, u.c, u.F) for u in model.uncertainties)
+    return model.uses_input_in_output or any(shared)
 
 
 def joint_rows(P: HPolytope) -> tuple[Array, Array, Array]:

@@ -109,7 +109,7 @@ class DualSum:
         known: list[fmpq] = [ZERO] * s.stack.shape[2]
         self._combine(known, s.stack[0], weight)
         if active:
-            self._channels(s, weight, known, of)
+            self._channels(s, weight, known, of, newest)
             self.total -= sum((abs(w) * r for w, r in zip(weight, rest, strict=False)), ZERO)
             self._disturbance(s, known[n + nu + 1 :])
         elif any(known[n + nu + 1 :]) or np.any(s.stack[1:, n:]) or np.any(s.on_channel) or np.any(s.on_w):
@@ -135,9 +135,15 @@ class DualSum:
                 for j in np.flatnonzero(matrix[i]):
                     target[j] += w * exact(matrix[i, j])
 
-    def _channels(self, s: WindowSample, weight: list[fmpq], known: list[fmpq], of: Factors) -> None:
-        """Add each channel's p: its box, its two lines over s = functional'(x, u, 1, w), and its effect."""
+    def _channels(self, s: WindowSample, weight: list[fmpq], known: list[fmpq], of: Factors, newest: bool) -> None:
+        """Add each channel's p: its box, its two lines over s = functional'(x, u, 1, w), and its effect.
+
+        One of the newest sample that does not reach the output has no part yet, since u there may not be known; its
+        bounds of s are then zero.
+        """
         for q, (gain, functional) in enumerate(zip(of.gains, of.functionals, strict=True)):
+            if newest and not (np.any(gain[self.c.n :]) or s.s_lower[q] or s.s_upper[q]):
+                continue
             lo, hi = (exact(v) for v in self.c.delta[q])
             low, high = exact(s.s_lower[q]), exact(s.s_upper[q])
             on_p = sum((w * exact(g) for w, g in zip(weight, gain, strict=True) if w and g), ZERO)

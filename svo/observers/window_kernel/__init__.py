@@ -39,6 +39,7 @@ from svo.observers.window_kernel.sample import (
     complete,
     enter,
     initialise,
+    move,
     take,
 )
 
@@ -77,6 +78,7 @@ __all__ = [
     "complete",
     "enter",
     "initialise",
+    "move",
     "new_window",
     "redraw_channel",
     "solve",

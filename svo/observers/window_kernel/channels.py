@@ -1,14 +1,24 @@
 """Channels of uncertainty: p = Delta s with s = f'(x, u, 1, w), bounded by two lines over s.
 
 The lines are exact where s keeps one sign, and the exact convex hull over [l, r] where it does not.
+
+A channel that reaches the output opens with its sample, any other with the transition from it, once u(k) is known.
 """
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from svo.observers.window_kernel.memory import UNIT
 from svo.observers.window_kernel.rows import clear_row, midpoint, set_row
+from svo.observers.window_kernel.short_rows import fill
+
+
+@njit(error_model="numpy")
+def reaches_output(w, size, k, q):
+    """Whether channel q of sample k enters y(k)."""
+    return np.any(w.gain[k % (size.N + size.late), q, size.n :])
 
 
 @njit(error_model="numpy")
@@ -33,12 +43,20 @@ def known_part(w, size, k, q):
 
 
 @njit(error_model="numpy")
-def bound_channels(w, size, k):
-    """Bounds of every s at sample k over the box of the variables; True if one leaves the sign of its s open."""
+def bound_channels(w, size, k, reaching):
+    """Bounds of s at sample k over the box of the variables; True if one leaves the sign of its s open.
+
+    Of the channels that reach the output, the others having no part in the window yet; or of those others.
+    """
     n, Z = w.psi.shape
     s, v = k % (size.N + 1), k % (size.N + size.late)
     some_open = False
     for q in range(size.nq):
+        if reaches_output(w, size, k, q) != reaching:
+            if reaching:
+                w.s_lower[v, q], w.s_upper[v, q] = 0.0, 0.0
+                fill(w.lines[v, q], 0.0)
+            continue
         f = w.functional[v, q]
         _, magnitude, centre, spread = known_part(w, size, k, q)
         rounding, radius = 0.0, 0.0
@@ -59,7 +77,15 @@ def bound_channels(w, size, k):
 
 
 @njit(error_model="numpy")
-def open_channel(w, size, k, q):
+def open_channels(w, size, k, reaching):
+    """Variables and rows of the channels that reach the output at the newest sample k, or of the others."""
+    for q in range(size.nq):
+        if reaches_output(w, size, k, q) == reaching:
+            _open_channel(w, size, k, q)
+
+
+@njit(error_model="numpy")
+def _open_channel(w, size, k, q):
     """Variable p = Delta s of channel q at the newest sample k: its box and, where s is not known, its two rows."""
     v = k % (size.N + size.late)
     lo, hi = w.delta[q, 0], w.delta[q, 1]

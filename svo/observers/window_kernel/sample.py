@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from svo.models.normal_form import ENORMOUS
-from svo.observers.window_kernel.channels import bound_channels, open_channel
+from svo.observers.window_kernel.channels import bound_channels, open_channels, reaches_output
 from svo.observers.window_kernel.factors import factor_sample
 from svo.observers.window_kernel.memory import LARGEST, PENDING, STARTED, TIME, UNDECIDED
 from svo.observers.window_kernel.motion import advance, anchor, slide
@@ -54,8 +54,8 @@ def _bound_disturbance(w, size, k, lower, upper):
 
 
 @njit(error_model="numpy")
-def _open_slot(w, size, k):
-    """Variables v(k) = (w(k), p(k)) with their bounds, and the rows among v(k) and x(k)."""
+def _open_disturbance(w, size, k):
+    """Variables w(k) with their bounds, and the rows among them."""
     n, nw, ny, nq, nh = size.n, size.nw, size.ny, size.nq, size.nh
     nv, nr = nw + nq, ny + nh + 2 * nq
     s, v = k % (size.N + 1), k % (size.N + size.late)
@@ -73,8 +73,6 @@ def _open_slot(w, size, k):
         w.raw_lower[i] = w.w_rows_lower[h] - shift
         w.raw_upper[i] = w.w_rows_upper[h] - shift
         set_row(w, w.psi, i, s, first, nv, 0.0)
-    for q in range(nq):
-        open_channel(w, size, k, q)
 
 
 @njit(error_model="numpy")
@@ -86,8 +84,6 @@ def _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper,
         slide(w, size)
     k = w.clock[TIME]
     new = k if first else k + 1
-    if not first:
-        copy(w.u[k % (size.N + 1)], u)
     opened = new if size.late == 1 else k
     if size.late == 1:
         _store_sample(w, size, new, u_next, y, stack, noise)
@@ -99,12 +95,34 @@ def _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper,
         return RANK_ROSE
     if size.late == 0:
         _store_sample(w, size, new, u_next, y, stack, noise)
-    elif not first:
-        advance(w, size, k)
-        w.clock[TIME] = new
-    if size.late == 0 and first:
+    if first:
         return FINE
-    return SIGN_OPEN if bound_channels(w, size, opened) else FINE
+    copy(w.u[k % (size.N + 1)], u)
+    return SIGN_OPEN if bound_channels(w, size, k, False) else FINE
+
+
+@njit(error_model="numpy")
+def _move(w, size, first):
+    k = w.clock[TIME]
+    if not first:
+        if size.late == 0:
+            _open_disturbance(w, size, k)
+        open_channels(w, size, k, False)
+        advance(w, size, k)
+        k += 1
+        w.clock[TIME] = k
+    return SIGN_OPEN if size.late == 1 and bound_channels(w, size, k, True) else FINE
+
+
+@njit(error_model="numpy")
+def _settle(w, size, reaching, limit):
+    """Tighten the bounds of those s whose sign is open."""
+    k = w.clock[TIME]
+    v = k % (size.N + size.late)
+    for q in range(size.nq):
+        if reaches_output(w, size, k, q) == reaching and w.s_lower[v, q] < 0.0 < w.s_upper[v, q]:
+            for program in range(2 * q, 2 * q + 2):
+                solve_programs(w, size, CHANNELS, program, program + 1, limit)
 
 
 @njit(error_model="numpy")
@@ -124,16 +142,12 @@ def _is_bounded(w, size, k):
 
 
 @njit(error_model="numpy")
-def _complete(w, size, first, eps):
+def _complete(w, size, eps):
     """False if the window has outgrown all bounds, and is of no more use."""
     k = w.clock[TIME]
     if size.late == 1:
-        _open_slot(w, size, k)
-    elif not first:
-        _open_slot(w, size, k)
-        advance(w, size, k)
-        k += 1
-        w.clock[TIME] = k
+        _open_disturbance(w, size, k)
+        open_channels(w, size, k, True)
     measure(w, size, k, eps)
     w.clock[STARTED] = 1
     return _is_bounded(w, size, k)
@@ -145,7 +159,8 @@ def _compile_enter(sources):
         """Take the data of a sample: its transition from the newest one under u, and its measurement y.
 
         w_old bounds the disturbance of the transition; w that of the new sample, used where the output has it.
-        Returns FINE, SIGN_OPEN (solve CHANNELS before `complete`), or an error that leaves the window as it was.
+        Returns FINE, SIGN_OPEN (solve CHANNELS, of those that do not reach the output, before `move`), or an error
+        that leaves the window as it was.
         """
         sources  # noqa: B018 - in the closure, so part of the cache's key
         return _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper)
@@ -156,12 +171,28 @@ def _compile_enter(sources):
 enter = _compile_enter(SOURCES)
 
 
+def _compile_move(sources):
+    @njit(cache=True, error_model="numpy")
+    def move(w, size, first):
+        """The transition to the sample that `enter` took, with all that drives it.
+
+        Returns FINE or SIGN_OPEN (solve CHANNELS, of those that reach the output, before `complete`).
+        """
+        sources  # noqa: B018 - in the closure, so part of the cache's key
+        return _move(w, size, first)
+
+    return move
+
+
+move = _compile_move(SOURCES)
+
+
 def _compile_complete(sources):
     @njit(cache=True, error_model="numpy")
-    def complete(w, size, first, eps):
-        """Write the rows of the sample that `enter` took; False if the window has outgrown all bounds."""
+    def complete(w, size, eps):
+        """Write the rows of the sample that `move` went to; False if the window has outgrown all bounds."""
         sources  # noqa: B018 - in the closure, so part of the cache's key
-        return _complete(w, size, first, eps)
+        return _complete(w, size, eps)
 
     return complete
 
@@ -172,20 +203,19 @@ complete = _compile_complete(SOURCES)
 def _compile_take(sources):
     @njit(cache=True, error_model="numpy")
     def take(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper, eps, limit):
-        """A whole sample in one call: `enter`, CHANNELS where a sign is open, `complete`, and the ARRIVAL programs.
+        """A whole sample in one call: `enter`, `move`, `complete`, CHANNELS where signs are open, and ARRIVAL.
 
-        Returns (what `enter` returns or OUTGROWN, verdict, program that found the window empty or -1).
+        Returns (what `enter` returns, or OUTGROWN; verdict; program that found the window empty or -1).
         """
         sources  # noqa: B018 - in the closure, so part of the cache's key
         code = _enter(w, size, first, u, u_next, y, stack, noise, w_old_lower, w_old_upper, w_lower, w_upper)
         if code == SIGN_OPEN:
-            start = 0
-            while start >= 0:
-                _, program = solve_programs(w, size, CHANNELS, start, ALL, limit)
-                start = program + 1 if program >= 0 else -1
+            _settle(w, size, False, limit)
         elif code != FINE:
             return code, UNDECIDED, -1
-        if not _complete(w, size, first, eps):
+        if _move(w, size, first) == SIGN_OPEN:
+            _settle(w, size, True, limit)
+        if not _complete(w, size, eps):
             return OUTGROWN, UNDECIDED, -1
         verdict, program = solve_programs(w, size, ARRIVAL, 0, ALL, limit)
         return code, verdict, program

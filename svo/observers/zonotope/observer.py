@@ -156,8 +156,8 @@ class ConstrainedZonotopeObserver:
         y : (ny,) array
             NaN = that sensor is missing; all NaN = prediction only.
         u_next : (nu,) array, optional
-            u(k+1); needed only if D or a D_i is not zero, or if the output depends on w or an uncertainty (F, C_i,
-            c_i, F_i) while some B_i is not zero.
+            u(k+1); needed only if D or a D_i is not zero, or if an uncertainty of B reaches the output: B_i, and C_i,
+            c_i or F_i, are not zero for one i.
         schedule : optional
             Scheduling value at the sample of y; it also gives the matrices of the next transition.
 

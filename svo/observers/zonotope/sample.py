@@ -3,7 +3,8 @@
 All in normal form, but for the certificates.
 
 An uncertainty enters as p = Delta s over the bounds [l, r] of s: the two lines of `WindowObserver`, as constraints over
-a generator of p. The same w and p enter the next state and the output.
+a generator of p. The same w and p enter the next state and the output. A p that the output does not have enters with
+the transition, once its input is known.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Stage:
     arrival : ConstrainedZonotope
         Of the state, before the measurement of the sample.
     joint : ConstrainedZonotope
-        Of (x, w, p), or of x as long as w and the channels have not entered.
+        Of x, then w and p as far as they have entered.
     data : WindowSample
         Multipliers are zero.
     gains, functionals : (nq, n + ny), (nq, n + nu + 1 + nw) arrays
@@ -46,7 +47,9 @@ class Stage:
     on_p : tuple of int
         Generators of those p that constraints bound.
     is_open : bool
-        Whether w and the channels have entered.
+        Whether w has entered.
+    channels : tuple of int
+        Those whose p has entered, in that order.
     """
 
     arrival: ConstrainedZonotope
@@ -59,6 +62,7 @@ class Stage:
     on_w: NDArray[np.int64]
     on_p: tuple[int, ...] = ()
     is_open: bool = False
+    channels: tuple[int, ...] = ()
 
 
 class StageBuilder:
@@ -70,7 +74,7 @@ class StageBuilder:
     model : UncertainModel
         That of the normal form.
     is_late : bool
-        Whether the output depends on w or a channel, so that both enter before the measurement.
+        Whether the output depends on w or a channel, which then enter before the measurement.
     """
 
     def __init__(self, form: NormalForm, eps: float) -> None:
@@ -102,44 +106,61 @@ class StageBuilder:
             raise ValueError("an uncertainty has a higher rank at this sample than at the model's typical schedule")
         nowhere = np.full(self.model.n_outputs, NO_ROW)
         stage = Stage(states, states, data, gains, functionals, left, nowhere, np.full(len(data.on_w), NO_ROW))
-        return self._measure(self.opened(stage, data.u) if self.is_late else stage)
+        if not self.is_late:
+            return self._measure(stage)
+        reaching = gains[:, self.model.n_states :].any(axis=1)
+        return self._measure(self._with_channels(self._with_disturbance(stage), reaching))
 
-    def opened(self, stage: Stage, u: Array) -> Stage:
-        """With w and the channels of the sample, once its input is known."""
-        data, n = replace(stage.data, u=u), self.model.n_states
-        joint = stage.joint.product_box(data.w_lower, data.w_upper)
+    def _with_disturbance(self, stage: Stage) -> Stage:
+        """With w of the sample."""
+        joint = stage.joint.product_box(stage.data.w_lower, stage.data.w_upper)
         first = len(joint.offset)
         rows, lower, upper = self._w_rows
-        joint = joint.cut(np.hstack([np.zeros((len(rows), n)), rows]), lower, upper)
-        on_w = np.arange(first, len(joint.offset))
-        f, known = stage.functionals[:, self._columns()], self._known(stage.functionals, u)
-        terms = self._known(np.abs(stage.functionals), np.abs(u))
-        low, high = joint.range_of(f, known)
+        joint = joint.cut(np.hstack([np.zeros((len(rows), self.model.n_states)), rows]), lower, upper)
+        return replace(stage, joint=joint, on_w=np.arange(first, len(joint.offset)), is_open=True)
+
+    def _with_channels(self, stage: Stage, chosen: NDArray[np.bool_]) -> Stage:
+        """With some channels of the sample, whose input is known as far as they depend on it."""
+        which, u, joint = np.flatnonzero(chosen), stage.data.u, stage.joint
+        if not which.size:
+            return stage
+        functionals = stage.functionals[which]
+        f, known = functionals[:, self._columns()], self._known(functionals, u)
+        terms = self._known(np.abs(functionals), np.abs(u))
+        over = np.hstack([f, np.zeros((len(which), joint.dim - f.shape[1]))])
+        low, high = joint.range_of(over, known)
         is_unsure = (low < 0.0) & (high > 0.0) & f.any(axis=1)
         if is_unsure.any():
-            ends = ZonotopeProgram(joint).support(np.vstack([f[is_unsure], -f[is_unsure]]))
+            ends = ZonotopeProgram(joint).support(np.vstack([over[is_unsure], -over[is_unsure]]))
             half = len(ends) // 2
             low[is_unsure] = np.maximum(low[is_unsure], known[is_unsure] - ends[half:])
             high[is_unsure] = np.minimum(high[is_unsure], known[is_unsure] + ends[:half])
         rounding = unit(len(u)) * (terms + np.abs(low) + np.abs(high))
         low, high = low - rounding, high + rounding
-        lines = np.array([_lines(*ends) for ends in zip(self._delta, low, high, strict=True)]).reshape(-1, 4)
-        on_p = []
-        for q in range(len(low)):
-            bounded = bool(f[q].any())
+        lines = np.array([_lines(*ends) for ends in zip(self._delta[which], low, high, strict=True)]).reshape(-1, 4)
+        on_p = list(stage.on_p)
+        for i, q in enumerate(which.tolist()):
+            bounded = bool(f[i].any())
             if bounded:
                 on_p.append(joint.generators.shape[1])
-            joint = self._with_channel(joint, q, f[q], (known[q], terms[q]), (low[q], high[q]), lines[q], bounded)
-        data = replace(data, s_lower=low, s_upper=high, lines=lines)
-        return replace(stage, joint=joint, data=data, on_w=on_w, on_p=tuple(on_p), is_open=True)
+            joint = self._with_channel(joint, q, f[i], (known[i], terms[i]), (low[i], high[i]), lines[i], bounded)
+        data = replace(
+            stage.data,
+            s_lower=_put(stage.data.s_lower, which, low),
+            s_upper=_put(stage.data.s_upper, which, high),
+            lines=_put(stage.data.lines, which, lines),
+        )
+        channels = (*stage.channels, *which.tolist())
+        return replace(stage, joint=joint, data=data, on_p=tuple(on_p), channels=channels)
 
     def predicted(self, stage: Stage, u: Array) -> tuple[Stage, ConstrainedZonotope]:
         """The stage with all that drives the next state, and the set of the next state."""
-        if not stage.is_open:
-            stage = self.opened(stage, u)
         stage = replace(stage, data=replace(stage.data, u=u))
+        waiting = np.ones(len(self._owner), dtype=bool)
+        waiting[list(stage.channels)] = False
+        stage = self._with_channels(stage if stage.is_open else self._with_disturbance(stage), waiting)
         n = self.model.n_states
-        M = np.hstack([stage.data.stack[0, :n][:, self._columns()], stage.gains[:, :n].T])
+        M = np.hstack([stage.data.stack[0, :n][:, self._columns()], stage.gains[list(stage.channels), :n].T])
         known = self._known(stage.data.stack[0, :n], u)
         size = self._known(np.abs(stage.data.stack[0, :n]), np.abs(u))
         return stage, stage.joint.affine_map(M, known).grown(unit(len(u)) * size + self._left_out(stage, slice(0, n)))
@@ -230,7 +251,7 @@ class StageBuilder:
         columns = self._columns() if stage.is_open else np.arange(n)
         rows = data.stack[0, n:][:, columns]
         if stage.is_open:
-            rows = np.hstack([rows, stage.gains[:, n:].T])
+            rows = np.hstack([rows, stage.gains[list(stage.channels), n:].T])
         known = self._known(data.stack[0, n:], data.u)
         lower, upper = stage.joint.interval_hull()
         size = np.abs(rows) @ np.maximum(np.abs(lower), np.abs(upper))
@@ -245,6 +266,13 @@ class StageBuilder:
         on_output = stage.on_output.copy()
         on_output[chosen] = np.arange(len(stage.joint.offset), len(joint.offset))
         return replace(stage, joint=joint, data=replace(data, slack=slack), on_output=on_output)
+
+
+def _put(values: Array, where: NDArray[np.int64], new: Array) -> Array:
+    """The values, with new ones at some places."""
+    changed = values.copy()
+    changed[where] = new
+    return changed
 
 
 def _at(values: Array, where: NDArray[np.int64]) -> Array:

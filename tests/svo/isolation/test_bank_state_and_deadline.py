@@ -199,9 +199,10 @@ def test_a_deadline_is_a_positive_time(deadline: float) -> None:
 
 
 def test_a_sample_that_is_refused_half_way_cannot_be_given_again_by_mistake() -> None:
-    # The pair of an actuator and a sensor fault needs u(k+1), the others do not.
+    # A reading that carries the input needs u(k+1), the others do not.
     nominal, faults = models(Step(START))
-    chosen = {"bias": faults["bias"].model(nominal), "both": FaultPair(loss(), scaling()).model(nominal)}
+    both = FaultPair(loss(), scaling()).model(nominal).replace(D=[[0.1], [0.0]])
+    chosen = {"bias": faults["bias"].model(nominal), "both": both}
     bank = ArchitectureI(WindowObserver(nominal, X0), {name: WindowObserver(m, X0) for name, m in chosen.items()})
     bank.update([0.0, 0.0], u=[0.1])
     before = bank.state_dict()

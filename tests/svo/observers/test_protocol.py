@@ -147,15 +147,3 @@ def test_what_is_no_log_is_named(kind: Any) -> None:
         observer.run(np.zeros((3, 1)))
     with pytest.raises(ValueError, match="log has no samples"):
         observer.run(Log(np.zeros(0), np.zeros((0, 1)), np.zeros((0, 1))))
-
-
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="B5: the kernel opens all channels before u(k+1) is known")
-def test_the_next_input_is_not_asked_for_where_no_uncertainty_of_it_reaches_the_output() -> None:
-    """F brings w into the output, but the Delta of B is not in it: u(k+1) says nothing of y(k+1)."""
-    uncertain = [Uncertainty(B=[[0.1]])]
-    model = UncertainModel(
-        [[0.5]], [[1.0]], [[1.0]], E=[[1.0]], F=[[1.0]], w=[0.1], n=[0.1], uncertainties=uncertain, Ts=1.0
-    )
-    observer = WindowObserver(model, HPolytope.box([-1.0], [1.0]))
-    observer.update([0.0])
-    observer.step([0.0], [0.0])

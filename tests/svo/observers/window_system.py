@@ -80,8 +80,10 @@ class _System:
         n = self.n
         if not newest or np.any(s.stack[0, n:, n + s.u.size + 1 :]) or np.any(s.stack[1:, n:]):
             self._disturbance(k, s)
-            for q in range(self.nq):
-                self._hull(k, q, s)
+            for q, (gain, _) in enumerate(self.factors[k]):
+                # a newest one that does not reach the output may have no part yet; its bounds of s are then zero
+                if not newest or any(gain[n:]) or s.s_lower[q] or s.s_upper[q]:
+                    self._hull(k, q, s)
         for i in range(n + s.y.size):
             row, constant = self._line(k, s, [Fraction(v) for v in s.stack[0, i]])
             for q, (gain, _) in enumerate(self.factors[k]):
