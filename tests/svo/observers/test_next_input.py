@@ -212,10 +212,10 @@ def test_a_refused_sample_leaves_no_trace_of_its_input(D: Any) -> None:
         return [[0.1, 0.0], [0.0, s]]
 
     model = UncertainModel(
-        [[0.9, 0.1], [0.0, 0.8]], [[0.0], [1.0]], [[1.0, 0.0]], E=np.eye(2), F=[[1.0, 0.0]], w=[0.05, 0.1], n=0.1, D=D,
+        [[0.9, 0.1], [0.0, 0.8]], [[0.0], [1.0]], [[1.0, 0.0]], E=np.eye(2), F=[[1.0, 0.0]], w=[0.05, 0.1], n=3.0, D=D,
         uncertainties=[Uncertainty(A=rising), Uncertainty(B=[[0.0], [0.3]])], schedule=0.0,
     )  # fmt: skip
-    observer, twin = (WindowObserver(model, HPolytope.box([-1.0, -1.0], [1.0, 1.0]), 2) for _ in range(2))
+    observer, twin = (WindowObserver(model, HPolytope.box([-1.0, -1.0], [1.0, 1.0]), 8) for _ in range(2))
     for o in (observer, twin):
         o.update([0.0], [1.0], schedule=0.0)
         for y in (0.5, 0.5, 0.5, np.nan):

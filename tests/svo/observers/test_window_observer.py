@@ -279,7 +279,7 @@ def test_nothing_compiles_after_warm_up() -> None:
     model, log = flown(30, uncertainties=[Uncertainty(A=[[0.0, 0.0], [0.01, 0.0]])])
     observer = WindowObserver(model, BOX)
     observer.warm_up()
-    functions = (kernel.enter, kernel.complete, kernel.solve, kernel.initialise)
+    functions = (kernel.enter, kernel.move, kernel.complete, kernel.solve, kernel.initialise)
     before = [len(f.signatures) for f in functions]
     run_all(observer, log)
     observer.step(log.u[0], [50.0])
