@@ -20,9 +20,8 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from svo.plant import HEALTHY, Plant, load_plant
+from svo.plant import HEALTHY, Plant, first_faulty_sample, load_plant
 from svo.studies.configuration import Job, StudyConfiguration
-from svo.studies.isolation.run import first_faulty_sample
 from svo.studies.isolation.runner import warm_up
 
 PLANT = "eclipse"
@@ -66,7 +65,7 @@ def examine(job: Job) -> Outcome:
     plant = _plant()
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     record = plant.bank(job.noise).run(log)
-    healthy_until = len(log) if job.fault == HEALTHY else first_faulty_sample(plant, job, log)
+    healthy_until = first_faulty_sample(plant, job.fault, job.profile, log.time)
     false_alarms = tuple(
         f"{name} at sample {died}"
         for name, died in record.died_at.items()

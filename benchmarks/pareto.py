@@ -20,7 +20,7 @@ from benchmarks._observers import arguments, console, output_directions, save, t
 from polytopes import HPolytope
 from svo import ConstrainedZonotopeObserver, WindowObserver
 from svo.logs.log import Log
-from svo.studies.isolation.run import first_faulty_sample
+from svo.plant import first_faulty_sample
 
 NOISE, SEED, HORIZONS, SETTLE = "quiet", 20_261_127, (1, 2, 5, 10, 20), 30
 WIDTH_EVERY = 10
@@ -82,7 +82,7 @@ def main(given: list[str] | None = None) -> None:
                     times.append(cost)
                     widths.append(width)
                 else:
-                    begin = first_faulty_sample(plant, data)
+                    begin = first_faulty_sample(plant, "alpha", "soft", data.time)
                     delays.append(np.inf if found is None else (found - begin + 1) * model.Ts)
         points.append((sensors, template, N, np.median(times), np.mean(widths, axis=0), np.mean(delays)))
     reference = {s: np.min([p[4] for p in points if p[0] == s], axis=0) for s, *_ in points}

@@ -41,6 +41,45 @@ class DetectionIndices:
     non_detection_rate: float
 
 
+@dataclass(frozen=True)
+class FirstAlarm:
+    """What the first alarm of a run tells of a fault: the one count of delays, in whole samples.
+
+    Attributes
+    ----------
+    delay : float or None
+        Seconds, the first faulty sample counting as one sampling time: an alarm at that very sample has delay Ts.
+        None without an alarm, or if it came before the fault: that is no detection, whatever is said later.
+    false_alarm : bool
+        Whether it came before the fault.
+    """
+
+    delay: float | None
+    false_alarm: bool
+
+
+def judge_alarm(alarm: int | None, first_faulty: int, Ts: float) -> FirstAlarm:
+    """Count the delay of a run's first alarm; for isolation, of the sample at which the fault that is there is named.
+
+    Parameters
+    ----------
+    alarm : int or None
+        Its sample; None if there is none.
+    first_faulty : int
+        First sample at which the fault acts; the number of samples in a run without a fault.
+    Ts : float
+        Sampling time [s].
+    """
+    if alarm is None or alarm < first_faulty:
+        return FirstAlarm(None, alarm is not None)
+    return FirstAlarm(round((alarm - first_faulty + 1) * Ts, 12), False)  # rounded: no digits of Ts show in a count
+
+
+def first_true(decision: NDArray[np.bool_]) -> int | None:
+    """First sample at which a decision (K,) is true; None if there is none."""
+    return int(np.argmax(decision)) if decision.any() else None
+
+
 def detection_indices(
     time: ArrayLike,
     decision: ArrayLike,

@@ -23,6 +23,7 @@ from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signatu
 from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scenario, locked, noise_set, thrust_loss
 from aircraft.missile.sequence import isolate_in_order
 from svo.checks import Array
+from svo.indices import first_true, judge_alarm
 from svo.store import Identity, Parts, versions, write_csv, write_text
 from svo.store import locked as alone_in
 from svo.store.tables import Json
@@ -35,6 +36,7 @@ LEARNT_FROM, LEARNT_TO = 5.0, 19.0  # s, before any fault
 NEAR_INTERCEPT = 63.0  # s, from which on the geometry changes fast
 RULES = ("fixed", "adaptive")
 HEALTHY = "healthy"
+NOT_AFTER = "-"  # the delay of what was isolated before it began
 MAGNITUDES: dict[str, Scenario] = {
     **{
         f"eta -{100 * part:g} %": Scenario((thrust_loss(part, 30.0),), ("r14",))
@@ -59,7 +61,7 @@ class ResidualRow:
     event_s : float or None
         Time of the first fault that the residual depends on; None if it depends on none.
     delay_s : float or None
-        To the first alarm from the event on; None if there is none.
+        To the first alarm; None if there is none, or if it came before the event: then it is no detection.
     false_alarms, late_false_alarms : int
         Samples in alarm before that event, before `NEAR_INTERCEPT` and after it.
     """
@@ -77,7 +79,10 @@ class ResidualRow:
 
 @dataclass(frozen=True)
 class OrderRow:
-    """Isolation by order in time in one flight: inputs and delays in their order, separated by spaces."""
+    """Isolation by order in time in one flight: inputs and delays in their order, separated by spaces.
+
+    A fault that is named before it began is wrong, and has a dash for its delay.
+    """
 
     scenario: str
     noise: str
@@ -199,7 +204,6 @@ def _residual_rows(
         first = len(run.time) if event is None else round(event / TS)
         for rule in RULES:
             flags = alarms[rule][:, r]
-            hits = np.flatnonzero(flags[first:])
             late = run.time[:first] >= NEAR_INTERCEPT
             yield ResidualRow(
                 name,
@@ -208,7 +212,7 @@ def _residual_rows(
                 residual,
                 rule,
                 event,
-                round((int(hits[0]) + 1) * TS, 9) if hits.size else None,
+                judge_alarm(first_true(flags), first, TS).delay,
                 int(flags[:first][~late].sum()),
                 int(flags[:first][late].sum()),
             )
@@ -218,24 +222,25 @@ def _order_row(simulator: Flights, run: Run, scenario: Scenario, name: str, nois
     error = ModelError(run.errors, simulator.model_error)
     found = isolate_in_order(run.flight.y, run.aligned_inputs, simulator.airframe, error)
     times = {fault: time for time, fault in scenario.events}
-    delays, contained = [], True
+    delays: list[float | None] = []
+    contained = True
     for fault in found.faults:
-        first = round(times.get(fault.input, np.inf) / TS) if fault.input in times else None
-        if first is None:
+        if fault.input not in times:
             continue
-        delays.append(f"{(fault.isolated - first + 1) * TS:.2f}")
+        delays.append(judge_alarm(fault.isolated, round(times[fault.input] / TS), TS).delay)
         j = INPUTS.index(fault.input)
         computed, achieved = (a[fault.isolated, j] for a in (run.flight.computed, run.flight.achieved))
         size = achieved if fault.kind == "locking" else achieved / computed
         contained = contained and fault.lower <= size <= fault.upper
     true_order = tuple(fault for _, fault in scenario.events)
-    wrong = found.order != true_order[: len(found.order)]
-    return OrderRow(name, noise, seed, " ".join(true_order), " ".join(found.order), wrong, " ".join(delays), contained)
+    wrong = found.order != true_order[: len(found.order)] or None in delays
+    shown = " ".join(NOT_AFTER if delay is None else f"{delay:.2f}" for delay in delays)
+    return OrderRow(name, noise, seed, " ".join(true_order), " ".join(found.order), wrong, shown, contained)
 
 
 def _delay_text(rows: Sequence[ResidualRow]) -> str:
     lines = [
-        "delay [s]: median (min to max) over the flights with an alarm; false: flights with an alarm before the fault",
+        "delay [s]: median (min to max) over the flights detected; false: an alarm before the fault, so not detected",
         f"{'case':<19}{'noise':<10}{'residual':<10}{'rule':<10}{'reached':<10}{'delay':<22}{'false':<8}"
         f"false after {NEAR_INTERCEPT:g} s",
     ]
@@ -267,8 +272,9 @@ def _order_text(rows: Sequence[OrderRow]) -> str:
         groups.setdefault((row.noise, row.scenario, row.found_order or "nothing"), []).append(row)
     totals = {key: sum(r.noise == key[0] and r.scenario == key[1] for r in rows) for key in groups}
     for key, group in groups.items():
-        delays = np.array([[float(v) for v in row.isolation_delays_s.split()] for row in group])
-        shown = " ".join(f"{v:.2f}" for v in np.median(delays, axis=0)) if delays.size else ""
+        columns = zip(*(row.isolation_delays_s.split() for row in group), strict=True)
+        delays = [[float(v) for v in column if v != NOT_AFTER] for column in columns]
+        shown = " ".join(f"{np.median(v):.2f}" if v else NOT_AFTER for v in delays)
         lines.append(f"{key[1]:<19}{key[0]:<10}{key[2]:<16}{f'{len(group)}/{totals[key]}':<10}{shown}")
     wrong = sum(row.wrong for row in rows)
     missed = sum(not row.sizes_contain_truth for row in rows)

@@ -21,6 +21,7 @@ from svo.plant.protocol import (
     TimesFaults,
     architecture_of,
     fault_start,
+    first_faulty_sample,
     in_architecture,
 )
 from svo.plant.registry import load_plant, registered_plants
@@ -56,6 +57,7 @@ __all__ = [
     "TimesFaults",
     "architecture_of",
     "fault_start",
+    "first_faulty_sample",
     "in_architecture",
     "load_plant",
     "no_schedule",

@@ -256,6 +256,13 @@ def fault_start(plant: Plant, fault: str, profile: str) -> float:
     return plant.fault_time
 
 
+def first_faulty_sample(plant: Plant, fault: str, profile: str, time: NDArray[np.float64]) -> int:
+    """Index of the first of a run's samples (K,), at these times [s], at which a fault acts; K without a fault."""
+    if fault == HEALTHY:
+        return len(time)
+    return round((fault_start(plant, fault, profile) - float(time[0])) / plant.Ts)
+
+
 @runtime_checkable
 class ComparesDetectors(Protocol):
     """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.

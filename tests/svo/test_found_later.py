@@ -11,8 +11,6 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +20,6 @@ import svo
 from polytopes import HPolytope
 from svo import ArchitectureI, PolytopeObserver, UncertainModel, WindowObserver
 from svo.isolation.alarms import Alarm
-from svo.logs.log import Log
 from tests.svo.studies.isolation.test_runner import configuration
 
 FAILED = pytest.fail.Exception  # of pytest.raises
@@ -43,18 +40,6 @@ def cart_observer() -> WindowObserver:
 
 
 # -- the house -------------------------------------------------------------------------------------------------------
-
-
-@later("A11", AssertionError, "a run that alarmed before its fault counts as detected in the elevator's study")
-def test_an_alarm_before_the_fault_is_no_detection() -> None:
-    from svo.studies.thresholds.run import _judge
-
-    alarm = np.zeros(40, dtype=bool)
-    alarm[10:] = True  # before the fault at sample 20, and never gone
-    log = Log(time=0.1 * np.arange(40), u=np.zeros((40, 1)), y=np.zeros((40, 1)))
-    plant: Any = SimpleNamespace(Ts=0.1, fault_time=2.0)
-    job: Any = SimpleNamespace(run=0, seed=0, fault="jam", profile="step", noise="calm")
-    assert _judge(plant, job, log, 1, "detector", alarm, ()).detection_delay_s is None
 
 
 @later("B1", AttributeError, "an alarm of a polytope observer ends the watch that shows it")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svo.indices import detection_indices, isolation_indices
+from svo.indices import FirstAlarm, detection_indices, first_true, isolation_indices, judge_alarm
 
 TIME = np.arange(10) * 0.1
 
@@ -143,3 +144,33 @@ def test_isolation_indices_are_those_of_each_decision():
     assert found["c"].non_detection_rate == 1.0
     with pytest.raises(ValueError, match="isolated names b, z"):
         isolation_indices(time, [*isolated[:-1], "z"], ("a",), t_from=0.3)
+
+
+@pytest.mark.parametrize(
+    ("said", "delay", "false_alarm"),
+    [
+        (range(4, 10), 0.1, False),
+        ([6], 0.3, False),
+        ([3], None, True),
+        (range(3, 10), None, True),
+        ([1, 6, 7], None, True),  # what a run says after a false alarm is no detection
+        ([], None, False),
+    ],
+)
+def test_the_first_alarm_of_a_run_is_a_detection_or_a_false_alarm(
+    said: Sequence[int], delay: float | None, false_alarm: bool
+) -> None:
+    assert judge_alarm(first_true(decide(*said)), 4, 0.1) == FirstAlarm(delay, false_alarm)
+
+
+@given(decision=st.lists(st.booleans(), min_size=1, max_size=30), fault=st.integers(0, 30))
+def test_delays_are_counted_in_whole_samples(decision: list[bool], fault: int) -> None:
+    """Against a count by hand, and against the indices of the survey where these know the same."""
+    found = judge_alarm(first_true(np.array(decision)), fault, 0.01)
+    assert found.false_alarm == any(decision[:fault])
+    after = [k for k in range(fault, len(decision)) if decision[k]]
+    wanted = None if found.false_alarm or not after else len(decision[fault : after[0]]) + 1
+    assert found.delay == (None if wanted is None else round(wanted * 0.01, 12))
+    if wanted is not None and len(decision) > 1:
+        survey = detection_indices(0.01 * np.arange(len(decision)), np.array(decision), fault * 0.01)
+        assert survey.first_alarm == pytest.approx(found.delay)

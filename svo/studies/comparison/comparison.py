@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from svo.detectors.detector import Detector, Kind, Setting
-from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, load_plant
+from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, first_faulty_sample, load_plant
 from svo.store import Parts
 from svo.store.parts import Row
 from svo.studies.comparison.run import ComparedRun, Condition, compare_run
@@ -207,7 +207,7 @@ def _tune(comparison: Comparison, plant: Plant, detector: Detector, scenarios: S
             if fault == HEALTHY:
                 healthy.append(detector.prepare(log))
             else:
-                first = round((fault_start(plant, fault, profile) - float(log.time[0])) / plant.Ts)
+                first = first_faulty_sample(plant, fault, profile, log.time)
                 faulty.append(FaultyRun(f"{fault} {profile}", detector.prepare(log), first))
     calibration = _Prepared(plant, detector, comparison)
     return tune(detector, healthy, faulty, calibration, comparison.rate, comparison.evaluations)

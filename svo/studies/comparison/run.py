@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.detectors.detector import NOBODY, Detector, Setting
-from svo.indices import detection_indices
+from svo.indices import detection_indices, first_true, judge_alarm
 from svo.logs.log import Log
 from svo.plant import HEALTHY
 
@@ -83,36 +83,35 @@ def compare_run(detector: Detector, setting: Setting, log: Log, condition: Condi
         share = float(detection.alarm.mean())
         return ComparedRun(*identity, None, None, bool(detection.alarm.any()), share, None, None, None, cost, width)
     found = detection_indices(log.time, detection.alarm, condition.fault_time)
-    _, alarmed = _first_from(log, np.where(detection.alarm, 0, NOBODY), condition.fault_time)
+    Ts = float(log.time[1] - log.time[0])
+    first = round((condition.fault_time - float(log.time[0])) / Ts)
+    alarmed = _begins_from(np.where(detection.alarm, 0, NOBODY), first)
     named, naming = None, None
     if detection.isolated is not None:
-        fault, naming = _first_from(log, detection.isolated, condition.fault_time)
-        named = None if fault == NOBODY else detector.faults[fault]
+        naming = _begins_from(detection.isolated, first)
+        named = None if naming is None else detector.faults[detection.isolated[naming]]
     return ComparedRun(
         *identity,
-        first_alarm_s=alarmed,
+        first_alarm_s=judge_alarm(alarmed, first, Ts).delay,
         delay_s=_finite(found.delay) if found.delay > 0 else None,
         false_alarm=found.false_alarm,
         false_detection_rate=_finite(found.false_detection_rate),
         non_detection_rate=found.non_detection_rate,
         isolated_as=named,
-        isolation_delay_s=naming if named == condition.fault else None,
+        isolation_delay_s=judge_alarm(naming, first, Ts).delay if named == condition.fault else None,
         microseconds_per_sample=cost,
         width=width,
     )
 
 
-def _first_from(log: Log, said: NDArray[np.intp], fault_time: float) -> tuple[int, float | None]:
-    """What is said first of all that begins to be said (K,) from the fault on, and when [s, counted as delays are].
+def _begins_from(said: NDArray[np.intp], first_faulty: int) -> int | None:
+    """The first sample from the fault on at which something begins to be said (K,).
 
     Something begins where the sample before says something else, or nothing.
     """
     begins = (said != NOBODY) & (said != np.append(NOBODY, said[:-1]))
-    first = detection_indices(log.time, begins, fault_time).first_alarm
-    if not np.isfinite(first):
-        return NOBODY, None
-    Ts = float(log.time[1] - log.time[0])
-    return int(said[round((fault_time + first - float(log.time[0])) / Ts) - 1]), first
+    begins[:first_faulty] = False
+    return first_true(begins)
 
 
 def _finite(value: float) -> float | None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import direct
 
 from svo.detectors.detector import Detector, Setting
+from svo.indices import first_true, judge_alarm
 
 
 @dataclass(frozen=True)
@@ -132,11 +133,13 @@ def level_at(detector: Detector, setting: Setting, healthy: Sequence[Any], rate:
 def detection_cost(detector: Detector, setting: Setting, faulty: Sequence[FaultyRun]) -> float:
     """Mean over scenarios of the mean ln(samples to the first alarm); a miss counts as the length of the run.
 
+    What is before the fault is not looked at: the level sees to false alarms.
+
     By the logarithm, so that being twice as slow costs the same in a scenario of milliseconds and of seconds.
     """
     logs: dict[str, list[float]] = {}
     for run in faulty:
         alarm = detector.run(setting, run.prepared, isolate=False).alarm[run.first_faulty :]
-        samples = int(np.argmax(alarm)) + 1 if alarm.any() else alarm.size
+        samples = judge_alarm(first_true(alarm), 0, 1.0).delay or alarm.size
         logs.setdefault(run.scenario, []).append(float(np.log(samples)))
     return float(np.mean([np.mean(values) for values in logs.values()]))

@@ -10,10 +10,11 @@ from functools import cache
 import numpy as np
 
 from svo.detection.detect import alarms_of, source_of_bank
+from svo.indices import judge_alarm
 from svo.isolation.alarms import Alarm
 from svo.isolation.record import BankRecord
 from svo.logs.log import Log
-from svo.plant import HEALTHY, Plant, fault_start, in_architecture, load_plant
+from svo.plant import HEALTHY, Plant, first_faulty_sample, in_architecture, load_plant
 from svo.studies.configuration import Job
 from svo.studies.isolation.exemplar import Exemplar, follow
 
@@ -112,12 +113,12 @@ def execute(plant: Plant, job: Job) -> RunOutcome:
 def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
     """The row of a run, from the record of its bank."""
     healthy = job.fault == HEALTHY
-    first_faulty = len(log) if healthy else first_faulty_sample(plant, job, log)
+    first_faulty = first_faulty_sample(plant, job.fault, job.profile, log.time)
     detected, isolated = record.detected_at, record.isolated_at
-    false_alarm = detected is not None and detected < first_faulty
+    found = judge_alarm(detected, first_faulty, plant.Ts)
     isolated_as = record.fault if isolated is not None else None
     true_died = not healthy and record.died_at[job.fault] is not None
-    timely = isolated is not None and isolated >= first_faulty and isolated_as == job.fault
+    rightly = isolated if isolated_as == job.fault else None
     seconds = record.seconds[~np.isnan(record.seconds)]  # a falsified observer is no longer stepped
     return RunRow(
         run=job.run,
@@ -126,10 +127,10 @@ def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
         profile=job.profile,
         noise=job.noise,
         first_alarm_s=None if detected is None else float(log.time[detected]),
-        detection_delay_s=None if false_alarm else _delay(plant, detected, first_faulty),
-        isolation_delay_s=_delay(plant, isolated, first_faulty) if timely else None,
+        detection_delay_s=found.delay,
+        isolation_delay_s=judge_alarm(rightly, first_faulty, plant.Ts).delay,
         isolated_as=isolated_as,
-        false_alarm=false_alarm,
+        false_alarm=found.false_alarm,
         wrong_isolation=true_died or (isolated_as is not None and isolated_as != job.fault),
         alive_end=", ".join(name for name, alive in zip(record.names, record.alive[-1], strict=True) if alive),
         microseconds_per_step=float(np.median(seconds) * 1e6),
@@ -149,13 +150,3 @@ def source_of(plant: Plant, job: Job) -> dict[str, str | int | float]:
         "seed": job.seed,
         "run": job.run,
     }
-
-
-def first_faulty_sample(plant: Plant, job: Job, log: Log) -> int:
-    """Index of the first sample at which the job's fault acts."""
-    return round((fault_start(plant, job.fault, job.profile) - float(log.time[0])) / plant.Ts)
-
-
-def _delay(plant: Plant, sample: int | None, first_faulty: int) -> float | None:
-    # Counted in samples, so that rounding of times never shows in a delay.
-    return None if sample is None else round((sample - first_faulty + 1) * plant.Ts, 12)

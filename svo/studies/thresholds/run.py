@@ -9,12 +9,12 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.indices import first_true, judge_alarm
 from svo.interval.detector import IntervalDetector
 from svo.interval.noise import NoiseCharacterization
 from svo.logs.log import Log
-from svo.plant import HEALTHY, Plant
+from svo.plant import HEALTHY, Plant, first_faulty_sample
 from svo.studies.configuration import Job
-from svo.studies.isolation.run import first_faulty_sample
 
 LEARNING_RECORDS = (1, 5)
 
@@ -69,8 +69,8 @@ class DetectorRow:
     first_alarm_s : float or None
         Time of the first alarm of the run [s].
     detection_delay_s : float or None
-        From the first faulty sample, which itself counts as one sampling time, to the first alarm from it on; None
-        if there is none, or without a fault.
+        From the first faulty sample, which itself counts as one sampling time, to that alarm; None if there is none,
+        or if it came before the fault: that is a false alarm and no detection.
     false_alarm : bool
         An alarm before the fault (at any time, without one).
     violated : tuple of int
@@ -106,11 +106,11 @@ def execute(plant: LearnsDetectors, job: Job) -> list[DetectorRow]:
         violated = tuple(noise.check(plant.residual(log)).violated.tolist()) if healthy else ()
         for name, detector in plant.interval_detectors(noise, float(log.u[0, 0])).items():
             alarm = detector.run(log).exceeded
-            rows.append(_judge(plant, job, log, count, name, alarm, violated))
+            rows.append(judge(plant, job, log, count, name, alarm, violated))
     return rows
 
 
-def _judge(
+def judge(
     plant: LearnsDetectors,
     job: Job,
     log: Log,
@@ -119,10 +119,8 @@ def _judge(
     alarm: NDArray[np.bool_],
     violated: tuple[int, ...],
 ) -> DetectorRow:
-    first, Ts = len(log), plant.Ts
-    if job.fault != HEALTHY:
-        first = first_faulty_sample(plant, job, log)
-    hits, after = np.flatnonzero(alarm), np.flatnonzero(alarm[first:])
+    first = first_true(alarm)
+    found = judge_alarm(first, first_faulty_sample(plant, job.fault, job.profile, log.time), plant.Ts)
     return DetectorRow(
         run=job.run,
         seed=job.seed,
@@ -131,8 +129,8 @@ def _judge(
         noise=job.noise,
         records=records,
         detector=detector,
-        first_alarm_s=float(log.time[hits[0]]) if hits.size else None,
-        detection_delay_s=round((int(after[0]) + 1) * Ts, 12) if after.size else None,
-        false_alarm=bool(alarm[:first].any()),
+        first_alarm_s=None if first is None else float(log.time[first]),
+        detection_delay_s=found.delay,
+        false_alarm=found.false_alarm,
         violated=violated,
     )

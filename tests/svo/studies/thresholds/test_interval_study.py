@@ -9,17 +9,20 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from svo.cli import app
+from svo.logs.log import Log
 from svo.plant import load_plant
-from svo.studies.configuration import StudyConfiguration
+from svo.studies.configuration import Job, StudyConfiguration
 from svo.studies.isolation.store import StudyFolder
 from svo.studies.thresholds import LearnsDetectors, publish, run_detection_study, summarise
-from svo.studies.thresholds.run import DetectorRow, execute
+from svo.studies.thresholds.run import DetectorRow, execute, judge
 from svo.studies.thresholds.runner import read_rows
 from svo.studies.thresholds.summary import summarise_assumption
 from svo.studies.thresholds.tables import assumption_lines, detection_table
@@ -181,3 +184,20 @@ def _is_alive(pid: int) -> bool:
         return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
     except FileNotFoundError:
         return False
+
+
+@pytest.mark.parametrize(
+    ("first", "stop", "delay", "false_alarm"),
+    [(20, 40, 0.1, False), (23, 40, 0.4, False), (10, 40, None, True), (19, 25, None, True), (0, 0, None, False)],
+)
+def test_an_alarm_before_the_fault_is_no_detection(
+    first: int, stop: int, delay: float | None, false_alarm: bool
+) -> None:
+    alarm = np.zeros(40, dtype=bool)
+    alarm[first:stop] = True
+    log = Log(time=0.1 * np.arange(40), u=np.zeros((40, 1)), y=np.zeros((40, 1)))
+    plant: Any = SimpleNamespace(Ts=0.1, fault_time=2.0)
+    row = judge(plant, Job(0, "jam", "step", "calm", 0, False), log, 1, "detector", alarm, ())
+    assert (row.detection_delay_s, row.false_alarm) == (delay, false_alarm)
+    healthy = judge(plant, Job(0, "none", "none", "calm", 0, False), log, 1, "detector", alarm, ())
+    assert (healthy.detection_delay_s, healthy.false_alarm) == (None, alarm.any())
