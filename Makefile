@@ -21,7 +21,7 @@ demo: $(VENV)/.study
 # The kernels compile while the tests' own needs install and the linter runs; then the tests.
 test:
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 kernels: $(VENV)/.core
 	$(BIN)/python -m tests.compiled

@@ -168,7 +168,8 @@ def fly(
     """
     samples = len(disturbance)
     superposed = np.zeros((samples, 2)) if excitation is None else np.ascontiguousarray(excitation, dtype=float)
-    arrays = (disturbance, noise, superposed, corruption.bias, corruption.effectiveness, corruption.moment)
+    gusts, errors = np.ascontiguousarray(disturbance), np.ascontiguousarray(noise)  # one layout: compiled once
+    arrays = (gusts, errors, superposed, corruption.bias, corruption.effectiveness, corruption.moment)
     names = ("disturbance", "noise", "excitation", "corruption.bias", "corruption.effectiveness", "corruption.moment")
     expected = ((samples, 3), (samples, 4), (samples, 2), (samples, 4), (samples, 2), (samples,))
     for name, array, shape in zip(names, arrays, expected, strict=True):

@@ -112,9 +112,10 @@ class InnovationFilter:
         x, P = self.model.mean.copy(), self.model.covariance.copy()
         states, white = np.empty((K, x.size)), np.empty(samples.y.shape)
         before = np.maximum(np.arange(K) - 1, 0)  # each measurement follows from the sample before
+        # D is copied, for one that is read-only would be compiled anew.
         bad = filter_samples(
             x, P, True, samples.A[before], samples.f[before], self.process_noise * samples.Q[before],
-            samples.C, samples.g, samples.R, samples.y, np.ascontiguousarray(E[before]), np.ascontiguousarray(D),
+            samples.C, samples.g, samples.R, samples.y, np.ascontiguousarray(E[before]), np.array(D, order="C"),
             states, white,
         )  # fmt: skip
         if bad >= 0:

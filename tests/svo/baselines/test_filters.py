@@ -12,6 +12,7 @@ from svo.baselines import (
     fault_effect,
     unknown_input_exists,
 )
+from svo.baselines.filter_kernel import filter_samples
 
 BOX = HPolytope.box([-1.0, -1.0, -0.5], [1.0, 2.0, 0.5])
 A = np.array([[0.9, 0.2, 0.0], [-0.1, 0.8, 0.3], [0.0, 0.1, 0.7]])
@@ -58,6 +59,15 @@ def test_kalman_filter_agrees_with_filterpy(log):
         squares = other.y @ np.linalg.solve(other.S, other.y)
         assert record.squares[k] == pytest.approx(squares, rel=1e-8)
         np.testing.assert_allclose(record.states[k], other.x, rtol=1e-8, atol=1e-10)
+
+
+def test_one_compiled_form_serves_logs_of_any_length_with_and_without_unknown_inputs(log):
+    for state_input in (None, [[1.0], [0.0], [0.0]]):
+        plain = InnovationFilter(GaussianModel(scheduled(), BOX), state_input=state_input)
+        for k in (1, 2, len(log)):
+            plain.run(Log(log.time[:k], log.u[:k], log.y[:k], schedule=log.schedule[:k]))
+        plain.start().update(log.y[0], log.u[0], schedule=log.schedule_at(0))
+    assert len(filter_samples.signatures) == 1
 
 
 def test_interacting_multiple_models_agree_with_filterpy(log):

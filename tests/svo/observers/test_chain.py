@@ -13,9 +13,7 @@ from svo.logs.log import Log
 from tests.svo.observers.random_plants import random_plant
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_every_bound_of_a_random_plant_is_proven(seed: int) -> None:
+def check_every_bound_is_proven(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model = random_plant(rng, largest=3)
     x0 = rng.uniform(-1.0, 1.0, model.n_states)
@@ -33,6 +31,18 @@ def test_every_bound_of_a_random_plant_is_proven(seed: int) -> None:
     first = verdicts.index("falsified") if "falsified" in verdicts else None
     assert chain.falsified_at == first
     assert chain.proven == (first is not None)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_every_bound_of_a_random_plant_is_proven(seed: int) -> None:
+    check_every_bound_is_proven(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100))
+def test_every_bound_of_many_plants_is_proven(seed: int) -> None:
+    check_every_bound_is_proven(seed)
 
 
 def test_a_bound_that_is_too_tight_is_not_proven(monkeypatch: pytest.MonkeyPatch) -> None:
