@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from svo.checks import Array, finite_array, positive_number
 from svo.models.held import Varying, which_vary
 from svo.models.inside_sample import departure, exponential, growth, kept
-from svo.models.model import UncertainModel
 from svo.models.stack import STATE_BLOCKS
-from svo.models.uncertainty import Uncertainty
+
+Plant: TypeAlias = Any  # an `svo.UncertainModel` in continuous time: the model imports this file, not the other way
 
 _ROUNDED_UP = 1e-9  # relative: more than what sums of numbers >= 0, fewer than a million, lose to rounding
 
@@ -27,53 +27,6 @@ def zero_order_hold(A: ArrayLike, B: ArrayLike, Ts: float) -> tuple[Array, Array
     return joint[:n, :n], joint[:n, n:]
 
 
-def remainder_bound(
-    A: ArrayLike,
-    B: ArrayLike | None,
-    *,
-    Ts: float,
-    x: ArrayLike,
-    u: ArrayLike | None = None,
-    E: ArrayLike | None = None,
-    a: ArrayLike | None = None,
-    w: Any = None,
-    uncertainties: Sequence[Uncertainty],
-    varying: str | Sequence[str] = (),
-) -> Array:
-    """What `UncertainModel.from_continuous` leaves out of a sample at most, for the uncertainties.
-
-    By variation of constants a Delta_i that is held leaves out int_0^Ts exp(A (Ts - t)) Delta_i A_i (x(t) - x(0)) dt.
-    |exp(A t)| <= exp(M t) entry by entry (`svo.models.inside_sample.growth`), and |x(t) - x(0)| <= t v with v a bound
-    of |dx/dt| over the bounds of x, u, w and Delta. A Delta_i, or a w that it multiplies, that varies inside the sample
-    is replaced by its mean there, which leaves out as much as `svo.models.inside_sample.departure` of the directions
-    times the radius, and |Gamma E_i| times both radii where both vary (a covariance).
-
-    Parameters
-    ----------
-    A, B, E, a, w, uncertainties, varying
-        As for `UncertainModel.from_continuous`.
-    Ts : float
-        Sampling time [s].
-    x, u : (n,), (nu,) arrays
-        Largest |x| that the state has at any time (between the samples too), and largest |u|.
-
-    Returns
-    -------
-    (n,) array
-
-    Raises
-    ------
-    ValueError
-        Naming the array, its shape and the expected one.
-    """
-    states = [Uncertainty(A=i.A, B=i.B, a=i.a, E=i.E, bounds=i.bounds, name=i.name) for i in uncertainties]
-    n = max(1, len(np.atleast_1d(A)))  # no outputs are needed here
-    arrays = {"A": A, "B": B, "C": np.zeros((0, n)), "E": E, "a": a, "w": w, "Ts": Ts, "uncertainties": states}
-    check_constant(arrays)
-    plant = UncertainModel(**arrays)
-    return left_out(plant, largest("x", x, n), largest("u", u, plant.n_inputs), vary_in(plant, varying))
-
-
 def check_constant(arrays: Mapping[str, Any]) -> None:
     """Of the arguments of a continuous plant, before their shapes are looked at."""
     owners = [("", arrays), *((" of an uncertainty", vars(item)) for item in arrays.get("uncertainties", ()))]
@@ -83,15 +36,22 @@ def check_constant(arrays: Mapping[str, Any]) -> None:
                 raise ValueError(f"{name}{owner} is a function; from_continuous takes constant arrays")
 
 
-def vary_in(plant: UncertainModel, varying: Any) -> Varying:
+def vary_in(plant: Plant, varying: Any) -> Varying:
     """What varies inside a sample of a continuous plant."""
     given = (plant.names or {}).get("disturbances")
     w_names = [""] * plant.n_disturbances if given is None else given
     return which_vary(varying, w_names, [item.name for item in plant.uncertainties])
 
 
-def left_out(plant: UncertainModel, x: Array, u: Array, vary: Varying) -> Array:
-    """`remainder_bound` of a plant whose arrays, all constant, are those of continuous time."""
+def left_out(plant: Plant, x: Array, u: Array, vary: Varying) -> Array:
+    """A bound (n,) of what a sample leaves out, for a plant whose arrays, all constant, are those of continuous time.
+
+    By variation of constants a Delta_i that is held leaves out int_0^Ts exp(A (Ts - t)) Delta_i A_i (x(t) - x(0)) dt.
+    |exp(A t)| <= exp(M t) entry by entry (`svo.models.inside_sample.growth`), and |x(t) - x(0)| <= t v with v a bound
+    of |dx/dt| over the bounds of x, u, w and Delta. A Delta_i, or a w that it multiplies, that varies inside the sample
+    is replaced by its mean there, which leaves out as much as `svo.models.inside_sample.departure` of the directions
+    times the radius, and |Gamma E_i| times both radii where both vary (a covariance).
+    """
     n, nw = plant.n_states, plant.n_disturbances
     lower, upper, _ = bounds_in(plant)
     reach = np.concatenate([x, u, [1.0], np.maximum(np.abs(lower), np.abs(upper))])
@@ -117,7 +77,7 @@ def left_out(plant: UncertainModel, x: Array, u: Array, vary: Varying) -> Array:
     return total * (1.0 + _ROUNDED_UP)
 
 
-def wandering(plant: UncertainModel, which: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
+def wandering(plant: Plant, which: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
     """The disturbances ``which`` of a continuous plant, where they vary inside a sample.
 
     Returns
@@ -133,7 +93,7 @@ def wandering(plant: UncertainModel, which: NDArray[np.bool_]) -> tuple[Array, A
     return common, shift, departure(A, E, common, plant.Ts) @ radius * (1.0 + _ROUNDED_UP)
 
 
-def bounds_in(plant: UncertainModel) -> tuple[Array, Array, Array]:
+def bounds_in(plant: Plant) -> tuple[Array, Array, Array]:
     """Constant bounds of w (nw,), (nw,) and noise."""
     edges = plant.w if isinstance(plant.w, tuple) else ()
     if plant.disturbance_polytope is not None or any(callable(edge) for edge in edges):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,16 @@ def read_arrays(path: str | Path) -> dict[str, Any]:
         raise ValueError(
             f"{path} has none of the variables {', '.join((*_MATRICES, *_VECTORS))}; found {', '.join(variables)}"
         )
+    return arrays
+
+
+def read_model(path: str | Path, given: Collection[str]) -> dict[str, Any]:
+    """`read_arrays`, with what makes them the arguments of a whole model beside those that are ``given``."""
+    arrays = read_arrays(path)
+    for name in arrays.keys() & set(given):
+        raise ValueError(f"{name} is given and {path} has it too; leave it out")
+    for name in {"A", "C"} - {*arrays, *given}:
+        raise ValueError(f"{path} has no variable {name!r}; expected a matrix, or give it as an argument")
     return arrays
 
 

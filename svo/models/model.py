@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,19 +21,20 @@ from numpy.typing import ArrayLike
 from polytopes import HPolytope
 from svo.checks import Array, finite_array, positive_number
 from svo.logs.log import Log
-from svo.models.along import along
 from svo.models.bounds import Bounds, bounds_of
-from svo.models.mat import read_arrays
-from svo.models.simulation import simulate
-from svo.models.stack import OUTPUT_BLOCKS, STATE_BLOCKS, Layout, ScheduledBlock, Stack, may_be_nonzero
+from svo.models.discretisation import check_constant
+from svo.models.draws import draw, draw_mixture
+from svo.models.mat import read_model
+from svo.models.origin import Origin
+from svo.models.schedule_table import ScheduleTable
+from svo.models.stack import Layout, Stack, may_be_nonzero
 from svo.models.state_range import StateRange, start_range, state_range
 from svo.models.statespace import state_space
 from svo.models.uncertainty import Schedulable, Uncertainty
 
-if TYPE_CHECKING:
-    from svo.models.origin import Origin
-
 __all__ = ["UncertainModel", "Uncertainty"]
+
+_TYPICAL = -1.0  # the sample before the first stands for the typical schedule, at which observers choose their rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +107,12 @@ class UncertainModel:
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainties", tuple(self.uncertainties))
         object.__setattr__(self, "Ts", positive_number("Ts", self.Ts, "sampling time in seconds"))
-        object.__setattr__(self, "layout", self._measure())
+        object.__setattr__(self, "layout", Layout.of(self, self.schedule))
         n = self.layout.n
         object.__setattr__(self, "physical_range", state_range("physical", self.physical, n, bounded=False))
         largest = state_range("largest", self.largest, n, bounded=True)
         object.__setattr__(self, "start_range", start_range(self.physical_range, largest))
-        object.__setattr__(self, "_stack", self._stacked())
+        object.__setattr__(self, "_stack", Stack.of(self.layout, self, self.uncertainties, self.schedule))
         object.__setattr__(self, "_bounds", bounds_of(self.w, self.n, self.layout.nw, self.layout.ny))
         if self._bounds.scheduled and self.schedule is None:
             raise ValueError(
@@ -119,7 +120,7 @@ class UncertainModel:
             )
         self.stack(self.schedule)
         self.bounds(self.schedule)
-        self._check_names()
+        self.layout.check_names(self.names)
 
     # -- sizes ---------------------------------------------------------------------------------
 
@@ -207,7 +208,25 @@ class UncertainModel:
         ValueError
             For a schedule that is missing or not shaped like the typical one, or an array or bound that is not finite.
         """
-        return along(self, schedule)
+        if not self.is_scheduled:
+            return self
+        if schedule is None:
+            raise ValueError("schedule is missing: the model has arrays or bounds that are functions of it")
+        values: Array = finite_array("schedule", schedule)
+        if values.ndim == 0 or len(values) == 0:
+            raise ValueError(f"schedule has shape {values.shape}; expected (K, ...), one value a sample")
+        typical: Array = finite_array("schedule of the model", self.schedule)
+        if typical.shape != values.shape[1:]:
+            raise ValueError(f"schedule has shape {values.shape[1:]} at a sample; expected {typical.shape}")
+        values = np.concatenate([typical[None], values])
+        samples: Array = _TYPICAL + np.arange(float(len(values)))
+        own, *others = self._stack.tables(samples, values)
+        changes: dict[str, Any] = {**own, "schedule": _TYPICAL}
+        if self._bounds.scheduled:
+            lower, upper, noise = (ScheduleTable(samples, edge) for edge in self.bounds_over(values))
+            changes |= {"n": noise} if self.disturbance_polytope is not None else {"w": (lower, upper), "n": noise}
+        tabled = [replace(item, **of) for item, of in zip(self.uncertainties, others, strict=True)]
+        return self.replace(**changes, uncertainties=tabled)
 
     def block(self, name: str, schedule: Any = None, uncertainty: int | None = None) -> Array:
         """One matrix by its name ("A", "B", ...), of the model or of one of its uncertainties."""
@@ -273,9 +292,10 @@ class UncertainModel:
         TypeError, ValueError
             Naming the array, its shape and the expected one, or the ``remainder`` that is missing.
         """
-        from svo.models.origin import Origin
-
-        return Origin.of({"A": A, "B": B, "C": C, "Ts": Ts} | rest, remainder, varying).model()
+        arrays = {"A": A, "B": B, "C": C, "Ts": Ts} | rest
+        check_constant(arrays)
+        made: UncertainModel = Origin(cls(**arrays), remainder, varying).model()
+        return made
 
     @classmethod
     def from_statespace(cls, sys: Any, *, Ts: float | None = None, **rest: Any) -> UncertainModel:
@@ -285,19 +305,9 @@ class UncertainModel:
         has the sampling time ``Ts`` if its dt is True. One that leaves open which it is (dt = None) is refused.
         A transfer function of scipy is realised first (`to_ss`).
         """
-        found = state_space(sys)
-        feedthrough = found.D if found.D.any() else None
-        if found.dt is not True and found.dt != 0:
-            if Ts not in (None, found.dt):
-                raise ValueError(
-                    f"Ts is {Ts} but the system is discrete with dt = {found.dt}; resample it, or leave Ts out"
-                )
-            return cls(found.A, found.B, found.C, D=feedthrough, Ts=float(found.dt), **rest)
-        if Ts is None:
-            raise ValueError(f"Ts is missing: the system has dt = {found.dt!r}, so its sampling time must be given")
-        if found.dt is True:
-            return cls(found.A, found.B, found.C, D=feedthrough, Ts=Ts, **rest)
-        return cls.from_continuous(found.A, found.B, found.C, Ts=Ts, D=feedthrough, **rest)
+        found = state_space(sys, Ts)
+        make = cls.from_continuous if found.is_continuous else cls
+        return make(found.A, found.B, found.C, D=found.D, Ts=found.Ts, **rest)
 
     @classmethod
     def from_mat(cls, path: str | Path, *, Ts: float, **rest: Any) -> UncertainModel:
@@ -305,12 +315,7 @@ class UncertainModel:
 
         ``rest`` are further arguments, such as ``uncertainties``; the matrices are those of discrete time.
         """
-        arrays = read_arrays(path)
-        for name in arrays.keys() & rest.keys():
-            raise ValueError(f"{name} is given and {path} has it too; leave it out")
-        for name in {"A", "C"} - {*arrays, *rest}:
-            raise ValueError(f"{path} has no variable {name!r}; expected a matrix, or give it as an argument")
-        return cls(**{"B": None} | arrays | rest, Ts=Ts)
+        return cls(**{"B": None} | read_model(path, rest) | rest, Ts=Ts)
 
     # -- simulation ------------------------------------------------------------------------------
 
@@ -343,67 +348,34 @@ class UncertainModel:
         ValueError
             For a wrong shape, NaN or Inf, or a schedule that is missing.
         """
-        return simulate(self, x0, u, rng, corners=corners, schedule=schedule)
-
-    # -- validation ------------------------------------------------------------------------------
-
-    def _value(self, name: str, owner: Any) -> Array | None:
-        value = getattr(owner, name)
-        if value is None:
-            return None
-        if callable(value):
-            if self.schedule is None:
-                raise ValueError(
-                    f"schedule is missing: {name} is a function of it, so give a typical value to check shapes with"
-                )
-            value = value(self.schedule)
-        return finite_array(name, value)
-
-    def _measure(self) -> Layout:
-        A, B, C, E = (self._value(name, self) for name in "ABCE")
-        if A is None or A.ndim != 2 or A.shape[0] != A.shape[1] or A.shape[0] == 0:
-            raise ValueError(f"A has shape {None if A is None else A.shape}; expected a square matrix (n, n), n >= 1")
-        if C is None or C.ndim != 2 or C.shape[1] != A.shape[0]:
-            raise ValueError(f"C has shape {None if C is None else C.shape}; expected (ny, {A.shape[0]})")
-        for name, value in (("B", B), ("E", E)):
-            if value is not None and (value.ndim != 2 or value.shape[0] != A.shape[0]):
-                raise ValueError(f"{name} has shape {value.shape}; expected ({A.shape[0]}, columns)")
-        F = self._value("F", self)
-        nw = E.shape[1] if E is not None else (F.shape[1] if F is not None and F.ndim == 2 else 0)
-        return Layout(n=A.shape[0], nu=0 if B is None else B.shape[1], nw=nw, ny=C.shape[0])
-
-    def _stacked(self) -> Stack:
-        constant = np.zeros((1 + len(self.uncertainties), *self.layout.shape))
-        scheduled = []
-        for item, source in enumerate((self, *self.uncertainties)):
-            owner = "" if item == 0 else f" of uncertainty {self.uncertainties[item - 1].name or item - 1}"
-            for name in STATE_BLOCKS + OUTPUT_BLOCKS:
-                value, array = getattr(source, name), self._value(name, source)
-                if array is None:
-                    continue
-                if array.shape != self.layout.block_shape(name):
-                    raise ValueError(self.layout.shape_message(owner, name, array.shape))
-                rows, cols = self.layout.block(name)
-                where = (item, rows, cols.start if array.ndim == 1 else cols)
-                if callable(value):
-                    scheduled.append(ScheduledBlock(name, owner, where, array.shape, value))
-                else:
-                    constant[where] = array
-        return Stack(self.layout, constant, tuple(scheduled))
-
-    def _check_names(self) -> None:
-        sizes = {
-            "states": self.n_states,
-            "inputs": self.n_inputs,
-            "outputs": self.n_outputs,
-            "disturbances": self.n_disturbances,
-        }
-        if self.names is not None and not isinstance(self.names, Mapping):
-            raise TypeError(f"names is {self.names!r:.80}; expected a table from any of {', '.join(sizes)} to names")
-        for key, values in (self.names or {}).items():
-            if key not in sizes:
-                raise ValueError(f"names has the key {key!r}; expected any of {', '.join(sizes)}")
-            if isinstance(values, str) or not hasattr(values, "__len__"):
-                raise TypeError(f"names[{key!r}] is {values!r:.80}; expected a list of {sizes[key]} names")
-            if len(values) != sizes[key]:
-                raise ValueError(f"names[{key!r}] has {len(values)} entries; expected {sizes[key]}")
+        inputs = finite_array("u", u, ("samples", self.n_inputs))
+        x: Array = finite_array("x0", x0, (self.n_states,))
+        if not len(inputs):
+            raise ValueError(f"u has shape {inputs.shape}; expected (samples, {self.n_inputs}), at least one sample")
+        if not isinstance(rng, np.random.Generator):
+            raise TypeError(f"rng is {rng!r}; expected a numpy Generator, such as np.random.default_rng(0)")
+        values = None if schedule is None else finite_array("schedule", schedule)
+        if values is None and self.is_scheduled:
+            raise ValueError(
+                "schedule is missing: the model has arrays that are functions of it; give one value a sample"
+            )
+        if values is not None and values.shape[:1] != inputs.shape[:1]:
+            raise ValueError(
+                f"schedule has shape {values.shape}; expected ({len(inputs)}, ...), one value a sample of u"
+            )
+        n, states, outputs = self.n_states, [], []
+        limits = np.array([q.bounds for q in self.uncertainties]).reshape(-1, 2)
+        polytope = self.disturbance_polytope
+        vertices = None if polytope is None else polytope.vertices()
+        for k, held in enumerate(inputs):
+            value = None if values is None else values[k]
+            lower, upper, noise = self.bounds(value)
+            w = draw(lower, upper, rng, corners) if vertices is None else draw_mixture(vertices, rng, corners)
+            deltas = draw(limits[:, 0], limits[:, 1], rng, corners)
+            total = np.tensordot(np.concatenate([[1.0], deltas]), self.stack(value), axes=1)
+            known = np.concatenate([x, held, [1.0], w])
+            states.append(x)
+            outputs.append(total[n:] @ known + draw(-noise, noise, rng, corners))
+            x = total[:n] @ known
+        time: Array = np.arange(len(inputs), dtype=float) * self.Ts
+        return Log(time=time, u=inputs, y=np.array(outputs), x=np.array(states), schedule=values)

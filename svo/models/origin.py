@@ -10,13 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array, finite_array
-from svo.models.discretisation import bounds_in, check_constant, largest, left_out, vary_in, wandering, zero_order_hold
+from svo.models.discretisation import (
+    Plant,
+    bounds_in,
+    check_constant,
+    largest,
+    left_out,
+    vary_in,
+    wandering,
+    zero_order_hold,
+)
 from svo.models.held import Varying
-from svo.models.model import UncertainModel
 from svo.models.stack import STATE_BLOCKS
 from svo.models.uncertainty import Uncertainty
 
-Change = Callable[[UncertainModel], UncertainModel]
+Change = Callable[[Plant], Plant]
 _ALIKE_IN_BOTH_TIMES = frozenset({"C", "D", "c", "n", "names", "physical", "largest"})
 
 
@@ -26,7 +34,7 @@ class Origin:
 
     Attributes
     ----------
-    plant : UncertainModel
+    plant : svo.UncertainModel
         Its arrays are those of dx/dt = ...; never observed.
     remainder, varying
         As given to `UncertainModel.from_continuous`.
@@ -34,18 +42,12 @@ class Origin:
         Whether the discrete model got arrays of discrete time since.
     """
 
-    plant: UncertainModel
+    plant: Plant
     remainder: Any = None
     varying: str | Sequence[str] = ()
     overwritten: bool = False
 
-    @classmethod
-    def of(cls, arrays: Mapping[str, Any], remainder: Any, varying: Any) -> Origin:
-        """From the arguments of the plant."""
-        check_constant(arrays)
-        return cls(UncertainModel(**arrays), remainder, varying)
-
-    def model(self) -> UncertainModel:
+    def model(self) -> Plant:
         """The discrete model; raises as `UncertainModel.from_continuous`."""
         check_constant(vars(self.plant))
         vary = vary_in(self.plant, self.varying)
@@ -61,7 +63,7 @@ class Origin:
             kept["names"] = {key: v for key, v in kept["names"].items() if key != "disturbances"} | own
         return replace(self, plant=self.plant.replace(**kept))
 
-    def changed(self, change: Change, remainder: Any = None) -> UncertainModel:
+    def changed(self, change: Change, remainder: Any = None) -> Plant:
         """The discrete model of the plant after a change of its continuous arrays.
 
         Raises
@@ -84,7 +86,7 @@ class Origin:
         """What an uncertainty of the plant adds to the next sample per Delta, to first order."""
         return _directions(zero_order_hold(self.plant.block("A"), np.eye(self.plant.n_states), self.plant.Ts)[1], item)
 
-    def _check_still_bounded(self, plant: UncertainModel) -> None:
+    def _check_still_bounded(self, plant: Plant) -> None:
         """Numbers bound what the arrays leave out that they were given for."""
         if self.remainder is None or isinstance(self.remainder, Mapping):
             return
@@ -120,7 +122,7 @@ class Origin:
             raise ValueError(
                 f"remainder is missing: give the bound ({n},) of what the first-order discretisation leaves out, or "
                 "remainder = {'states': ..., 'inputs': ...}, the largest absolute values of states and inputs, from "
-                "which it is computed (svo.models.discretisation.remainder_bound)"
+                "which it is computed (svo.models.remainder.remainder_bound)"
             )
         return None
 
@@ -130,11 +132,11 @@ def _leaves_something_out(item: Uncertainty, varies: bool) -> bool:
     return item.A is not None or (bool(varies) and any(getattr(item, name) is not None for name in STATE_BLOCKS))
 
 
-def _product_varies(plant: UncertainModel, vary: Varying) -> bool:
+def _product_varies(plant: Plant, vary: Varying) -> bool:
     return bool(vary.w.any()) and any(item.E is not None for item in plant.uncertainties)
 
 
-def _discretised(plant: UncertainModel, width: Array | None, vary: Varying) -> UncertainModel:
+def _discretised(plant: Plant, width: Array | None, vary: Varying) -> Plant:
     """The discrete model, with |remainder| <= ``width`` (n,)."""
     A, Ts = plant.block("A"), plant.Ts
     step, gamma = zero_order_hold(A, np.eye(len(A)), Ts)
@@ -173,7 +175,7 @@ def _parted(item: Uncertainty, varies: bool) -> list[Uncertainty]:
 
 
 def _with_more_disturbances(
-    plant: UncertainModel, arrays: dict[str, Any], items: list[Uncertainty], width: Array, varies: NDArray[np.bool_]
+    plant: Plant, arrays: dict[str, Any], items: list[Uncertainty], width: Array, varies: NDArray[np.bool_]
 ) -> tuple[dict[str, Any], list[Uncertainty]]:
     """The means of those that vary and are measured too, since a mean is no value at a sample; then one a state."""
     n, nw = plant.n_states, plant.n_disturbances
@@ -206,7 +208,7 @@ def _constant(F: Any) -> Array:
     return np.zeros((0, 0)) if F is None else np.asarray(F, dtype=float)
 
 
-def _more_names(plant: UncertainModel, parted: NDArray[np.intp]) -> Any:
+def _more_names(plant: Plant, parted: NDArray[np.intp]) -> Any:
     names = plant.names
     if names is None or "disturbances" not in names:
         return names

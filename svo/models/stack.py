@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -49,6 +49,33 @@ class Layout:
         rows, cols = self.block(name)
         return (rows.stop - rows.start,) if name in "ac" else (rows.stop - rows.start, cols.stop - cols.start)
 
+    @classmethod
+    def of(cls, owner: Any, schedule: Any) -> Layout:
+        """The sizes of a model, from its blocks A, B, C, E and F at a schedule."""
+        A, B, C, E, F = (_value(name, owner, schedule) for name in "ABCEF")
+        if A is None or A.ndim != 2 or A.shape[0] != A.shape[1] or A.shape[0] == 0:
+            raise ValueError(f"A has shape {None if A is None else A.shape}; expected a square matrix (n, n), n >= 1")
+        if C is None or C.ndim != 2 or C.shape[1] != A.shape[0]:
+            raise ValueError(f"C has shape {None if C is None else C.shape}; expected (ny, {A.shape[0]})")
+        for name, value in (("B", B), ("E", E)):
+            if value is not None and (value.ndim != 2 or value.shape[0] != A.shape[0]):
+                raise ValueError(f"{name} has shape {value.shape}; expected ({A.shape[0]}, columns)")
+        nw = E.shape[1] if E is not None else (F.shape[1] if F is not None and F.ndim == 2 else 0)
+        return cls(n=A.shape[0], nu=0 if B is None else B.shape[1], nw=nw, ny=C.shape[0])
+
+    def check_names(self, names: Any) -> None:
+        """Refuse names that are not one a state, input, output or disturbance."""
+        sizes = {"states": self.n, "inputs": self.nu, "outputs": self.ny, "disturbances": self.nw}
+        if names is not None and not isinstance(names, Mapping):
+            raise TypeError(f"names is {names!r:.80}; expected a table from any of {', '.join(sizes)} to names")
+        for key, values in (names or {}).items():
+            if key not in sizes:
+                raise ValueError(f"names has the key {key!r}; expected any of {', '.join(sizes)}")
+            if isinstance(values, str) or not hasattr(values, "__len__"):
+                raise TypeError(f"names[{key!r}] is {values!r:.80}; expected a list of {sizes[key]} names")
+            if len(values) != sizes[key]:
+                raise ValueError(f"names[{key!r}] has {len(values)} entries; expected {sizes[key]}")
+
     def shape_message(self, owner: str, name: str, shape: tuple[int, ...]) -> str:
         return f"{name}{owner} has shape {shape}; expected {self.block_shape(name)}"
 
@@ -76,6 +103,43 @@ class Stack:
     def __post_init__(self) -> None:
         self.constant.setflags(write=False)
         object.__setattr__(self, "table", self._as_table())
+
+    @classmethod
+    def of(cls, layout: Layout, model: Any, uncertainties: Sequence[Any], schedule: Any) -> Stack:
+        """The blocks of a model and of its uncertainties; those that are functions are checked at a schedule."""
+        constant = np.zeros((1 + len(uncertainties), *layout.shape))
+        scheduled = []
+        for item, source in enumerate((model, *uncertainties)):
+            owner = "" if item == 0 else f" of uncertainty {source.name or item - 1}"
+            for name in STATE_BLOCKS + OUTPUT_BLOCKS:
+                value, array = getattr(source, name), _value(name, source, schedule)
+                if array is None:
+                    continue
+                if array.shape != layout.block_shape(name):
+                    raise ValueError(layout.shape_message(owner, name, array.shape))
+                rows, cols = layout.block(name)
+                where = (item, rows, cols.start if array.ndim == 1 else cols)
+                if callable(value):
+                    scheduled.append(ScheduledBlock(name, owner, where, array.shape, value))
+                else:
+                    constant[where] = array
+        return cls(layout, constant, tuple(scheduled))
+
+    def tables(self, points: Array, schedule: Array) -> list[dict[str, Any]]:
+        """The scheduled blocks by name, of the model and of each uncertainty: tables of their values over a schedule.
+
+        Parameters
+        ----------
+        points : (K,) array
+            What the tables are functions of.
+        schedule : (K, ...) array
+            Where the blocks are evaluated.
+        """
+        stacks = self.over(schedule)
+        tables: list[dict[str, Any]] = [{} for _ in self.constant]
+        for block in self.scheduled:
+            tables[block.where[0]][block.name] = ScheduleTable(points, stacks[(slice(None), *block.where)])
+        return tables
 
     def at(self, schedule: Any) -> Array:
         """See `UncertainModel.stack`."""
@@ -118,3 +182,17 @@ class Stack:
                 return None
             stacks[(slice(None), *block.where)] = table.values
         return ScheduleTable(first.points, stacks)
+
+
+def _value(name: str, owner: Any, schedule: Any) -> Array | None:
+    """A block of a model or of an uncertainty, at a schedule where it is a function of it."""
+    value = getattr(owner, name)
+    if value is None:
+        return None
+    if callable(value):
+        if schedule is None:
+            raise ValueError(
+                f"schedule is missing: {name} is a function of it, so give a typical value to check shapes with"
+            )
+        value = value(schedule)
+    return finite_array(name, value)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from svo import UncertainModel, Uncertainty
-from svo.models.discretisation import remainder_bound
+from svo.models.remainder import remainder_bound
 
 
 @settings(max_examples=40, deadline=None)

@@ -14,8 +14,9 @@ from scipy.linalg import expm
 
 from polytopes import HPolytope
 from svo import ConstrainedZonotopeObserver, UncertainModel, Uncertainty, WindowObserver
-from svo.models.discretisation import left_out, remainder_bound, vary_in, wandering, zero_order_hold
+from svo.models.discretisation import left_out, vary_in, wandering, zero_order_hold
 from svo.models.inside_sample import departure, growth, kept
+from svo.models.remainder import remainder_bound
 
 Array = NDArray[np.float64]
 PARTS = 12

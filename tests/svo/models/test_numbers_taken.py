@@ -30,7 +30,8 @@ from svo.baselines import GaussianModel, InnovationFilter
 from svo.faults import ActuatorFault, PlantFault, Ramp, SensorFault, Step
 from svo.indices import detection_indices
 from svo.interval import GainBounds, IntervalDetector, IntervalPredictor, NoiseCharacterization
-from svo.models.discretisation import remainder_bound, zero_order_hold
+from svo.models.discretisation import zero_order_hold
+from svo.models.remainder import remainder_bound
 from svo.models.schedule_table import ScheduleTable
 from svo.plant import Column, Columns
 from svo.residual_tests import CUSUM, StaticThreshold
@@ -233,7 +234,7 @@ def is_wrong(case: Case, kind: str, name: str) -> bool:
 
 
 def refusal(call: Callable[[], Any]) -> str:
-    """"ours" if a call ends in an error that our own code raised and that says what was expected."""
+    """ "ours" if a call ends in an error that our own code raised and that says what was expected."""
     try:
         call()
     except (TypeError, ValueError) as error:

@@ -10,7 +10,7 @@ from scipy.io import savemat
 from svo.detection.detect import detect
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.logs.log import Log
-from svo.models.discretisation import remainder_bound
+from svo.models.remainder import remainder_bound
 from svo.models.uncertainty import Uncertainty
 from svo.observers.window.observer import WindowObserver
 from svo.plant.description import find_plant, keep_description, read_description
