@@ -16,7 +16,7 @@ from svo.isolation.alarm_kinds import model_data
 from svo.isolation.alarms import Alarm, write_alarms
 from svo.isolation.bank import Bank
 from svo.isolation.record import BankRecord, Recorder, Verdict
-from svo.logs.columns import check_times, columns_of_log
+from svo.logs.columns import check_times
 from svo.logs.log import Log
 from svo.models.digest import model_digest
 from svo.observers.base import Observer
@@ -117,7 +117,7 @@ def check_log(plant: MonitoredPlant, log: Log) -> None:
         raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.logs.file.read_log gives")
     if len(log) == 0:
         raise ValueError("log has no samples; expected at least one")
-    columns_of_log(replace(log, x=None), plant.columns)
+    replace(log, x=None).to_columns(plant.columns)
     check_times(log.time, plant.Ts, lambda k: f"log, sample {k}")
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.checks import Array
-from svo.isolation.bank import Bank, Sample, falsified_and_undecided, largest_at
+from svo.isolation.bank import Bank, falsified_and_undecided, largest_at
 from svo.isolation.bank_checks import by_name, check_counts
-from svo.isolation.bank_state import set_arrays, set_of
+from svo.isolation.bank_state import Sample, set_arrays, set_of
 from svo.isolation.global_logic import GlobalLogic
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.observers.base import Observer, Step

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from inspect import signature
 from time import perf_counter
 from types import MappingProxyType
@@ -14,46 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import is_finite_number, real_array
+from svo.checks import is_finite_number
 from svo.isolation.bank_checks import check_observers
-from svo.isolation.bank_state import restore_state, saved_state
+from svo.isolation.bank_state import BankState, Sample, restored, saved
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.logs.log import Log
 from svo.observers.base import Observer, Step
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """The arguments of a bank's step, kept for observers that have to repeat it."""
-
-    u: ArrayLike | None
-    y: ArrayLike
-    u_next: ArrayLike | None
-    schedule: Any
-
-    @classmethod
-    def given(cls, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any) -> Sample:
-        """Copies of what a user hands over, whose arrays may hold the next sample when these are needed again."""
-        before = None if u is None else real_array("u", u, finite=False)
-        after = None if u_next is None else real_array("u_next", u_next, finite=False)
-        return cls(before, real_array("y", y, finite=False, missing=True), after, schedule)
-
-    def arrays(self) -> dict[str, NDArray[np.float64]]:
-        """Those that are given, by name."""
-        given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule")}
-        try:
-            return {name: np.array(v, dtype=float) for name, v in given.items() if v is not None}
-        except (TypeError, ValueError) as error:
-            raise TypeError(f"schedule is {self.schedule!r}; only numbers and arrays of them can be saved") from error
-
-    @classmethod
-    def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Sample:
-        """What `arrays` gave; numbers are numbers again."""
-        u, y, u_next, schedule = (arrays.get(name) for name in ("u", "y", "u_next", "schedule"))
-        if y is None:
-            raise ValueError("y is missing")
-        return cls(u, y, u_next, float(schedule) if schedule is not None and schedule.ndim == 0 else schedule)
 
 
 class Bank(ABC):
@@ -199,7 +166,8 @@ class Bank(ABC):
         TypeError
             If an observer has no ``state_dict``, or the schedule is no number or array of numbers.
         """
-        return saved_state(self)
+        observers = {name: saved(name, observer) for name, observer in self.observers.items()}
+        return BankState(self._kind, self._sample, self._state, self._latest, self._memory(), observers).arrays()
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on bit for bit from what `state_dict` gave; this bank must be built as that one was.
@@ -211,7 +179,12 @@ class Bank(ABC):
         ValueError
             If the state is that of a bank with other models or options, or is incomplete. The bank is unchanged.
         """
-        restore_state(self, state)
+        if not isinstance(state, Mapping):
+            raise TypeError(f"state is a {type(state).__name__}; expected the named arrays that state_dict() gave")
+        try:
+            self._resume(BankState.of_arrays(state))
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"state does not belong to this bank: {error}") from error
 
     def reset(self, set: HPolytope) -> None:
         """Forget everything; all models are alive and the state at the next measurement lies in ``set``."""
@@ -315,19 +288,20 @@ class Bank(ABC):
         self._latest = Sample(None, self._nothing(), None, None)
         self._adopt(self._logic.initial())
 
-    def _resume(
-        self,
-        sample: int | None,
-        state: LogicState,
-        observers: Mapping[str, Observer],
-        arrays: Mapping[str, NDArray[np.float64]],
-    ) -> None:
+    @property
+    def _kind(self) -> list[str]:
+        """What a state must agree in: architecture, models and options."""
+        return [type(self).__name__, *self.observers, repr(self._logic)]
+
+    def _resume(self, state: BankState) -> None:
         """Go on from a saved state."""
-        latest = Sample.of_arrays(arrays)
-        self._recall(arrays)
-        self.observers = MappingProxyType(dict(observers))
-        self._sample, self._latest, self._refused_by = sample, latest, None
-        self._adopt(state)
+        if state.kind != self._kind:
+            raise ValueError(f"it is of {state.kind}, this bank is {self._kind}")
+        observers = {name: restored(name, observer, state.observers[name]) for name, observer in self.observers.items()}
+        self._recall(state.memory)
+        self.observers = MappingProxyType(observers)
+        self._sample, self._latest, self._refused_by = state.sample, state.latest, None
+        self._adopt(state.logic)
 
     def _adopt(self, state: LogicState) -> None:
         self._state = state

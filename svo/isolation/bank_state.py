@@ -1,4 +1,4 @@
-"""The state of a bank as named arrays: observers, conclusions, and what observers would start again from.
+"""What a bank's next samples depend on, a value that it gives and takes; and the same as named arrays.
 
 Names are ``observer.<number>.<name>`` for the arrays of the observers, in the order of the bank, and ``bank.<name>``
 for the rest. Conclusions are JSON in an array of text; nothing is pickled.
@@ -8,76 +8,131 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from svo.checks import real_array
 from svo.isolation.logic import LogicState, Tally
 from svo.models.digest import canonical
 from svo.observers.base import Observer
 from svo.observers.saved_state import digest_of_arrays
 
-if TYPE_CHECKING:
-    from svo.isolation.bank import Bank
-
 State = dict[str, NDArray[Any]]
 _SET = ("A", "b", "C", "d")
-_SEAL = "bank.seal"
+_CONCLUSIONS, _SEAL = "bank.conclusions", "bank.seal"
 
 
-def saved_state(bank: Bank) -> State:
-    """See `Bank.state_dict`."""
-    for name, observer in bank.observers.items():
-        if not (hasattr(observer, "state_dict") and hasattr(type(observer), "from_state_dict")):
-            raise TypeError(f"observer {name!r} ({type(observer).__name__}) has no state_dict to save")
-    state: State = {
-        f"observer.{i}.{key}": value
-        for i, observer in enumerate(bank.observers.values())
-        for key, value in observer.state_dict().items()  # type: ignore[attr-defined]
-    }
-    conclusions = {"kind": _kind(bank), "sample": bank._sample, "logic": asdict(bank._state)}
-    state["bank.conclusions"] = np.array(json.dumps(conclusions))
-    for key, value in (*bank._latest.arrays().items(), *bank._memory().items()):
-        state[f"bank.{key}"] = value
-    state[_SEAL] = np.array(digest_of_arrays(_own(state)))
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The arguments of a bank's step, kept for observers that have to repeat it."""
+
+    u: ArrayLike | None
+    y: ArrayLike
+    u_next: ArrayLike | None
+    schedule: Any
+
+    @classmethod
+    def given(cls, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any) -> Sample:
+        """Copies of what a user hands over, whose arrays may hold the next sample when these are needed again."""
+        before = None if u is None else real_array("u", u, finite=False)
+        after = None if u_next is None else real_array("u_next", u_next, finite=False)
+        return cls(before, real_array("y", y, finite=False, missing=True), after, schedule)
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """Those that are given, by name."""
+        given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule")}
+        try:
+            return {name: np.array(v, dtype=float) for name, v in given.items() if v is not None}
+        except (TypeError, ValueError) as error:
+            raise TypeError(f"schedule is {self.schedule!r}; only numbers and arrays of them can be saved") from error
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Sample:
+        """What `arrays` gave; numbers are numbers again."""
+        u, y, u_next, schedule = (arrays.get(name) for name in ("u", "y", "u_next", "schedule"))
+        if y is None:
+            raise ValueError("y is missing")
+        return cls(u, y, u_next, float(schedule) if schedule is not None and schedule.ndim == 0 else schedule)
+
+
+@dataclass(frozen=True, eq=False)
+class BankState:
+    """Everything that the next samples of a bank depend on.
+
+    Attributes
+    ----------
+    kind : list of str
+        What the bank must agree in: its architecture, the names of its observers, its options.
+    sample : int or None
+        Number of the newest sample.
+    logic : LogicState
+        What was concluded from it.
+    latest : Sample
+        Its data.
+    memory : mapping of str to array
+        What an architecture keeps besides.
+    observers : mapping of str to mapping of str to array
+        What each observer's ``state_dict`` gave.
+    """
+
+    kind: list[str]
+    sample: int | None
+    logic: LogicState
+    latest: Sample
+    memory: State
+    observers: Mapping[str, State]
+
+    def arrays(self) -> State:
+        """As named arrays."""
+        parts = {f"observer.{i}": part for i, part in enumerate(self.observers.values())}
+        parts["bank"] = self.latest.arrays() | self.memory
+        state = {f"{owner}.{key}": value for owner, part in parts.items() for key, value in part.items()}
+        conclusions = {"kind": self.kind, "sample": self.sample, "logic": asdict(self.logic)}
+        state[_CONCLUSIONS] = np.array(json.dumps(conclusions))
+        return state | {_SEAL: np.array(_digest(state))}
+
+    @classmethod
+    def of_arrays(cls, state: Mapping[str, NDArray[Any]]) -> BankState:
+        """What `arrays` named.
+
+        Raises
+        ------
+        AttributeError, KeyError, TypeError, ValueError
+            For anything else.
+        """
+        conclusions = json.loads(str(state[_CONCLUSIONS]))
+        if str(state[_SEAL]) != _digest(state):
+            raise ValueError("its conclusions were changed since state_dict() made it")
+        memory, (_, *names, _) = _part(state, "bank."), conclusions["kind"]
+        return cls(
+            kind=conclusions["kind"],
+            sample=conclusions["sample"],
+            logic=_logic_state(conclusions["logic"]),
+            latest=Sample.of_arrays(memory),
+            memory=memory,
+            observers={name: _part(state, f"observer.{i}.") for i, name in enumerate(names)},
+        )
+
+
+def saved(name: str, observer: Observer) -> State:
+    """The state of an observer of a bank."""
+    if not (hasattr(observer, "state_dict") and hasattr(type(observer), "from_state_dict")):
+        raise TypeError(f"observer {name!r} ({type(observer).__name__}) has no state_dict to save")
+    state: State = observer.state_dict()
     return state
 
 
-def restore_state(bank: Bank, state: Mapping[str, NDArray[Any]]) -> None:
-    """See `Bank.load_state_dict`."""
-    if not isinstance(state, Mapping):
-        raise TypeError(f"state is a {type(state).__name__}; expected the named arrays that state_dict() gave")
-    try:
-        conclusions = json.loads(str(state["bank.conclusions"]))
-        if conclusions["kind"] != _kind(bank):
-            raise ValueError(f"it is of {conclusions['kind']}, this bank is {_kind(bank)}")
-        logic = _logic_state(conclusions["logic"])
-        if str(state[_SEAL]) != digest_of_arrays(_own(state)):
-            raise ValueError("its conclusions were changed since state_dict() made it")
-        observers = {
-            name: _restored(name, observer, _part(state, f"observer.{i}."))
-            for i, (name, observer) in enumerate(bank.observers.items())
-        }
-        bank._resume(conclusions["sample"], logic, observers, _part(state, "bank."))
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"state does not belong to this bank: {error}") from error
-
-
-def _restored(name: str, observer: Observer, state: State) -> Observer:
+def restored(name: str, observer: Observer, state: State) -> Observer:
     """An observer as a state describes it, which must be one like the bank's."""
     again: Observer = type(observer).from_state_dict(observer.model, state)  # type: ignore[attr-defined]
     options, wanted = getattr(again, "options", None), getattr(observer, "options", None)
     if options is not None and wanted is not None and canonical(options) != canonical(wanted):
         raise ValueError(f"observer {name!r} has other options than this bank's")
     return again
-
-
-def _own(state: Mapping[str, NDArray[Any]]) -> State:
-    """What is the bank's own."""
-    return {key: value for key, value in state.items() if key.startswith("bank.") and key != _SEAL}
 
 
 def set_arrays(name: str, P: HPolytope | None) -> State:
@@ -90,9 +145,9 @@ def set_of(name: str, state: Mapping[str, NDArray[Any]]) -> HPolytope | None:
     return HPolytope(*(state[f"{name}.{part}"] for part in _SET)) if f"{name}.A" in state else None
 
 
-def _kind(bank: Bank) -> list[str]:
-    """What a state must agree in: architecture, models and options."""
-    return [type(bank).__name__, *bank.observers, repr(bank._logic)]
+def _digest(state: Mapping[str, NDArray[Any]]) -> str:
+    """Of what is the bank's own."""
+    return digest_of_arrays({key: v for key, v in state.items() if key.startswith("bank.") and key != _SEAL})
 
 
 def _part(state: Mapping[str, NDArray[Any]], prefix: str) -> State:

@@ -18,7 +18,7 @@ from typing import Literal
 NOMINAL = "nominal"
 GLOBAL = "global"
 
-BankState = Literal["nominal", "detected", "isolated", "unexplained"]
+StateName = Literal["nominal", "detected", "isolated", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class LogicState:
         Whether the next sample changes nothing if nothing is falsified.
     """
 
-    state: BankState
+    state: StateName
     alive: tuple[str, ...]
     running: tuple[str, ...]
     restart: tuple[str, ...] = ()

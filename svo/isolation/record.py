@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.isolation.logic import GLOBAL, BankState
+from svo.isolation.logic import GLOBAL, StateName
 from svo.observers.base import Step
 
 
@@ -35,7 +35,7 @@ class Verdict:
     """
 
     sample: int
-    state: BankState
+    state: StateName
     fault: str | None
     alive: tuple[str, ...]
     detected_at: int | None
@@ -72,7 +72,7 @@ class BankRecord:
     """
 
     names: tuple[str, ...]
-    states: tuple[BankState, ...]
+    states: tuple[StateName, ...]
     alive: NDArray[np.bool_]
     seconds: NDArray[np.float64]
     undecided: NDArray[np.bool_]
@@ -89,7 +89,7 @@ class Recorder:
 
     def __init__(self, names: tuple[str, ...], samples: int) -> None:
         self._names = names
-        self._states: list[BankState] = []
+        self._states: list[StateName] = []
         self._alive = np.zeros((samples, len(names)), dtype=bool)
         self._seconds = np.full((samples, len(names)), np.nan)
         self._undecided = np.zeros((samples, len(names)), dtype=bool)

@@ -12,16 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.logs.log import Log
-
-if TYPE_CHECKING:
-    from svo.logs.names import Column, Columns
+from svo.logs.names import Column, Columns
 
 Place = Callable[[int], str]
 
@@ -82,8 +79,8 @@ def not_there(where: str) -> ValueError:
     )
 
 
-def log_of_columns(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float) -> Log:
-    """A log from whole columns of numbers, (K,) each, of which `wanted_columns` are there.
+def checked_parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float) -> dict[str, Any]:
+    """`parts` of whole columns of numbers, (K,) each, of which `wanted_columns` are there, once they are checked.
 
     Raises
     ------
@@ -96,17 +93,18 @@ def log_of_columns(source: str, cells: Mapping[str, Array], columns: Columns, Ts
         for k in np.flatnonzero(bad)[:1]:
             where = f"{source}, sample {k}, column {name!r}"
             raise not_there(where) if np.isnan(values[k]) else not_finite(where, float(values[k]))
-    return assemble(source, cells, columns, Ts, lambda k: f"sample {k}")
+    return parts(source, cells, columns, Ts, lambda k: f"sample {k}")
 
 
-def assemble(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float, place: Place) -> Log:
-    """A log from columns whose cells have been checked; ``place`` says where in the source a sample stands."""
+def parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float, place: Place) -> dict[str, Any]:
+    """The arguments of a `Log`, from columns whose cells have been checked; ``place`` says where a sample stands."""
     time = cells[columns.time]
     if not len(time):
         raise ValueError(f"{source} has a header but no samples; expected one row a sample")
     check_times(time, Ts, lambda k: f"{source}, {place(k)}, column {columns.time!r}")
     y, u, x = (_stack(cells, group, len(time)) for group in (columns.outputs, columns.inputs, columns.states))
-    return Log(time=time, u=u, y=y, x=x if columns.states and columns.states[0].name in cells else None)
+    has_states = columns.states and columns.states[0].name in cells
+    return {"time": time, "u": u, "y": y, "x": x if has_states else None}
 
 
 def check_times(time: Array, Ts: float, place: Place) -> None:
@@ -130,27 +128,6 @@ def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError
 def is_sampled(before: float, after: float, Ts: float) -> bool:
     """Whether a row follows another by one sampling time."""
     return bool(_is_sampled(np.array(after - before), Ts))
-
-
-def columns_of_log(log: Log, columns: Columns) -> dict[str, Array]:
-    """The columns of a log by name: time, inputs, outputs and, if it has them, true states.
-
-    Raises
-    ------
-    ValueError
-        If the log has another number of channels than there are columns.
-    """
-    groups = [("u", log.u, columns.inputs), ("y", log.y, columns.outputs)]
-    if log.x is not None:
-        groups.append(("x", log.x, columns.states))
-    cells = {columns.time: log.time}
-    for name, values, group in groups:
-        if values.shape[1] != len(group):
-            raise ValueError(
-                f"{name} of the log has {values.shape[1]} channels; expected {len(group)}, one a column of the plant"
-            )
-        cells |= {c.name: values[:, i] for i, c in enumerate(group)}
-    return cells
 
 
 def _is_sampled(steps: Array, Ts: float) -> NDArray[np.bool_]:

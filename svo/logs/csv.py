@@ -12,15 +12,13 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
-from svo.logs.columns import Array, LogNote, assemble, may_be_missing, not_finite, not_there, wanted_columns
+from svo.logs.columns import Array, LogNote, may_be_missing, not_finite, not_there, parts, wanted_columns
 from svo.logs.log import Log
-
-if TYPE_CHECKING:
-    from svo.logs.names import Columns
+from svo.logs.names import Columns
 
 
 def write_csv(path: Path, cells: Mapping[str, Array]) -> None:
@@ -47,7 +45,7 @@ def read_csv(path: Path, columns: Columns, Ts: float) -> Log:
             values.append(parser.parse(line, row))
     table = np.array(values).reshape(-1, len(parser.names))
     cells = {name: table[:, i].copy() for i, name in enumerate(parser.names)}
-    return assemble(str(path), cells, columns, Ts, lambda k: f"line {lines[k]}")
+    return Log(**parts(str(path), cells, columns, Ts, lambda k: f"line {lines[k]}"))
 
 
 def _complete_lines(path: Path) -> io.BytesIO:

@@ -7,17 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from svo.checks import is_finite_number
-from svo.logs.columns import columns_of_log
 from svo.logs.csv import read_csv, write_csv
 from svo.logs.log import Log
 from svo.logs.mat import read_mat_log, write_mat
+from svo.logs.names import Columns
 from svo.logs.parquet import read_parquet, write_parquet
-
-if TYPE_CHECKING:
-    from svo.logs.names import Columns
 
 
 class _Format(NamedTuple):
@@ -43,7 +40,7 @@ def write_log(path: str | Path, log: Log, columns: Columns) -> None:
         If the format needs a package that is not installed.
     """
     path = Path(path)
-    _format(path).write(path, columns_of_log(log, columns))
+    _format(path).write(path, log.to_columns(columns))
 
 
 def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:

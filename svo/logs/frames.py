@@ -1,69 +1,43 @@
-"""Logs to and from data frames of pandas and data sets of xarray, by the columns of a plant."""
+"""The columns of a log as data frames of pandas and data sets of xarray."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
-from svo.checks import optional_import, real_array
-from svo.logs.columns import columns_of_log, log_of_columns, wanted_columns
-from svo.logs.log import Log
-
-if TYPE_CHECKING:
-    from svo.logs.names import Column, Columns
+from svo.checks import Array, optional_import, real_array
+from svo.logs.columns import wanted_columns
+from svo.logs.names import Columns
 
 
-def to_dataframe(log: Log, columns: Columns) -> Any:
-    """A `pandas.DataFrame`, one column a channel (time included), in the order of a log file.
-
-    The units are in ``frame.attrs["units"]``, by column name.
-    """
-    frame = optional_import("pandas", "study", "data frames").DataFrame(columns_of_log(log, columns))
+def dataframe(cells: Mapping[str, Array], columns: Columns) -> Any:
+    """See `Log.to_dataframe`."""
+    frame = optional_import("pandas", "study", "data frames").DataFrame(cells)
     frame.attrs["units"] = _units(columns)
     return frame
 
 
-def from_dataframe(frame: Any, columns: Columns, Ts: float) -> Log:
-    """A log from a `pandas.DataFrame`, under the rules of `svo.logs.columns`.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Time is a column, or the index if that has the name of the time column.
-    columns : Columns
-    Ts : float
-        The model's sampling time [s].
-
-    Raises
-    ------
-    TypeError, ValueError
-        Naming the sample and the column.
-    """
+def cells_of_dataframe(frame: Any, columns: Columns) -> dict[str, Array]:
+    """The columns of numbers that a log needs; see `Log.from_dataframe`."""
     optional_import("pandas", "study", "data frames")
     if columns.time not in frame.columns and frame.index.name == columns.time:
         frame = frame.reset_index()
     names = wanted_columns("the data frame", list(frame.columns), columns)
-    cells = {}
-    for name in names:
-        cells[name] = real_array(f"the data frame, column {name!r}", frame[name], finite=False, missing=True)
-    return log_of_columns("the data frame", cells, columns, Ts)
+    return {
+        name: real_array(f"the data frame, column {name!r}", frame[name], finite=False, missing=True) for name in names
+    }
 
 
-def to_xarray(log: Log, columns: Columns) -> Any:
-    """An `xarray.Dataset` over the time of the log: one variable a channel, with its unit as the attribute "units"."""
-    cells, units = columns_of_log(log, columns), _units(columns)
+def dataset(cells: Mapping[str, Array], columns: Columns) -> Any:
+    """See `Log.to_xarray`."""
+    cells, units = dict(cells), _units(columns)
     time = (columns.time, cells.pop(columns.time), {"units": "s"})
     variables = {name: (columns.time, values, {"units": units[name]}) for name, values in cells.items()}
     return optional_import("xarray", "xarray", "data sets").Dataset(variables, coords={columns.time: time})
 
 
-def from_xarray(dataset: Any, columns: Columns, Ts: float) -> Log:
-    """A log from an `xarray.Dataset` whose variables are the columns, each over one dimension.
-
-    Raises
-    ------
-    TypeError, ValueError
-        Naming the sample and the variable.
-    """
+def cells_of_dataset(dataset: Any, columns: Columns) -> dict[str, Array]:
+    """The variables of numbers that a log needs; see `Log.from_xarray`."""
     names = wanted_columns("the data set", list(dataset.variables), columns)
     samples = dataset[columns.time].shape
     cells = {}
@@ -75,9 +49,8 @@ def from_xarray(dataset: Any, columns: Columns, Ts: float) -> Log:
             )
         values = dataset[name].to_numpy()
         cells[name] = real_array(f"the data set, variable {name!r}", values, finite=False, missing=True)
-    return log_of_columns("the data set", cells, columns, Ts)
+    return cells
 
 
 def _units(columns: Columns) -> dict[str, str]:
-    every: tuple[Column, ...] = columns.inputs + columns.outputs + columns.states
-    return {columns.time: "s"} | {c.name: c.unit for c in every}
+    return {columns.time: "s"} | {c.name: c.unit for c in (*columns.inputs, *columns.outputs, *columns.states)}

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from svo.checks import Array, readings, real_array
-
-if TYPE_CHECKING:
-    from svo.logs.names import Columns
+from svo.logs import frames
+from svo.logs.columns import checked_parts
+from svo.logs.names import Columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,28 +68,98 @@ class Log:
 
     # -- other forms -----------------------------------------------------------------------------
 
-    def to_dataframe(self, columns: Columns) -> Any:
-        """A `pandas.DataFrame`; see `svo.logs.frames.to_dataframe`."""
-        from svo.logs.frames import to_dataframe
+    def to_columns(self, columns: Columns) -> dict[str, Array]:
+        """The columns (K,) by name: time, inputs, outputs and, if the log has them, true states.
 
-        return to_dataframe(self, columns)
+        Parameters
+        ----------
+        columns : Columns
+            The names, in the order of the channels.
+
+        Raises
+        ------
+        ValueError
+            If the log has another number of channels than there are columns.
+        """
+        groups = (("u", self.u, columns.inputs), ("y", self.y, columns.outputs), ("x", self.x, columns.states))
+        cells = {columns.time: self.time}
+        for name, values, group in groups:
+            if values is None:
+                continue
+            if values.shape[1] != len(group):
+                wanted = f"{len(group)}, one a column of the plant"
+                raise ValueError(f"{name} of the log has {values.shape[1]} channels; expected {wanted}")
+            cells |= {c.name: values[:, i] for i, c in enumerate(group)}
+        return cells
+
+    @classmethod
+    def from_columns(cls, source: str, cells: Mapping[str, Array], columns: Columns, Ts: float) -> Log:
+        """From whole columns (K,) of numbers by name, under the rules of `svo.logs.columns`.
+
+        Parameters
+        ----------
+        source : str
+            Where they come from, for messages.
+        cells : mapping of str to (K,) array
+            Time, inputs, outputs and, if all are there, states.
+        columns : Columns
+            The names, in the order of the channels.
+        Ts : float
+            The model's sampling time [s].
+
+        Raises
+        ------
+        ValueError
+            Naming the source, the sample and the column.
+        """
+        return cls(**checked_parts(source, cells, columns, Ts))
+
+    def to_dataframe(self, columns: Columns) -> Any:
+        """A `pandas.DataFrame`, one column a channel (time included), in the order of a log file.
+
+        The units are in ``frame.attrs["units"]``, by the names of ``columns``.
+        """
+        return frames.dataframe(self.to_columns(columns), columns)
 
     @classmethod
     def from_dataframe(cls, frame: Any, columns: Columns, Ts: float) -> Log:
-        """From a `pandas.DataFrame`; see `svo.logs.frames.from_dataframe`."""
-        from svo.logs.frames import from_dataframe
+        """From a `pandas.DataFrame`, under the rules of `svo.logs.columns`.
 
-        return from_dataframe(frame, columns, Ts)
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Time is a column, or the index if that has the name of the time column.
+        columns : Columns
+            The names, in the order of the channels.
+        Ts : float
+            The model's sampling time [s].
+
+        Raises
+        ------
+        TypeError, ValueError
+            Naming the sample and the column.
+        """
+        return cls.from_columns("the data frame", frames.cells_of_dataframe(frame, columns), columns, Ts)
 
     def to_xarray(self, columns: Columns) -> Any:
-        """An `xarray.Dataset`; see `svo.logs.frames.to_xarray`."""
-        from svo.logs.frames import to_xarray
-
-        return to_xarray(self, columns)
+        """An `xarray.Dataset` over the time of the log: a variable a channel of ``columns``, with its unit."""
+        return frames.dataset(self.to_columns(columns), columns)
 
     @classmethod
     def from_xarray(cls, dataset: Any, columns: Columns, Ts: float) -> Log:
-        """From an `xarray.Dataset`; see `svo.logs.frames.from_xarray`."""
-        from svo.logs.frames import from_xarray
+        """From an `xarray.Dataset` whose variables are the columns, each over one dimension.
 
-        return from_xarray(dataset, columns, Ts)
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+        columns : Columns
+            The names, in the order of the channels.
+        Ts : float
+            The model's sampling time [s].
+
+        Raises
+        ------
+        TypeError, ValueError
+            Naming the sample and the variable.
+        """
+        return cls.from_columns("the data set", frames.cells_of_dataset(dataset, columns), columns, Ts)

@@ -8,14 +8,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from svo.logs.columns import Array, log_of_columns, wanted_columns
+from svo.logs.columns import Array, wanted_columns
 from svo.logs.log import Log
 from svo.logs.mat_file import MatFile
-
-if TYPE_CHECKING:
-    from svo.logs.names import Columns
+from svo.logs.names import Columns
 
 _VARIABLE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
 
@@ -56,4 +53,4 @@ def read_mat_log(path: Path, columns: Columns, Ts: float) -> Log:
                 f"{path}, variable {name!r} has shape {shape}; expected a vector of {samples} samples, as "
                 f"{columns.time!r} has"
             )
-    return log_of_columns(str(path), {name: variables[name].ravel() for name in names}, columns, Ts)
+    return Log.from_columns(str(path), {name: variables[name].ravel() for name in names}, columns, Ts)

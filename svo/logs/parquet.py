@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from svo.checks import optional_import
-from svo.logs.columns import Array, log_of_columns, wanted_columns
+from svo.logs.columns import Array, wanted_columns
 from svo.logs.log import Log
+from svo.logs.names import Columns
 from svo.store.unpacking import check_unpacked
-
-if TYPE_CHECKING:
-    from svo.logs.names import Columns
 
 
 def write_parquet(path: Path, cells: Mapping[str, Array]) -> None:
@@ -40,7 +38,7 @@ def read_parquet(path: Path, columns: Columns, Ts: float) -> Log:
         with _one_error(path, arrow):
             table = source.read(columns=names)
             cells = {name: np.array(table.column(name).to_numpy(), dtype=float) for name in names}
-    return log_of_columns(str(path), cells, columns, Ts)
+    return Log.from_columns(str(path), cells, columns, Ts)
 
 
 @contextmanager
