@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from svo import UncertainModel, Uncertainty
+from polytopes import HPolytope
+from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.models.discretisation import zero_order_hold
+from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
 from tests.svo.observers.other_units import Units
 
 
@@ -70,3 +72,31 @@ def test_what_floats_can_hold_is_the_nearest_float(A: Any) -> None:
         np.testing.assert_array_equal(held, [[1.0, 0.5], [0.0, 1.0]])
     else:
         assert step[0, 1] == pytest.approx(1e3 * step[1, 1] / 1e6, rel=1e-2)
+
+
+@pytest.mark.parametrize("make", [WindowObserver, ConstrainedZonotopeObserver])
+def test_powers_of_two_on_time_change_nothing_of_an_observer(make: Any) -> None:
+    """Rates in other units of time, the same samples: sets, verdicts and the normal memory are equal bit for bit."""
+    rng = np.random.default_rng(3)
+    for time in (-37, 20):
+        arrays = continuous(rng)
+        faster = {k: None if v is None else np.ldexp(v, -time) for k, v in arrays.items() if k in "ABEa"}
+        (item,) = arrays["uncertainties"]
+        items = [Uncertainty(A=np.ldexp(item.A, -time), E=np.ldexp(item.E, -time), bounds=item.bounds)]
+        one = UncertainModel.from_continuous(**arrays)
+        two = UncertainModel.from_continuous(
+            **(arrays | faster | {"uncertainties": items, "Ts": float(np.ldexp(arrays["Ts"], time))})
+        )
+        x0, u = rng.uniform(-1, 1, one.n_states), rng.normal(size=(10, one.n_inputs))
+        log = one.simulate(x0, u, rng, corners=True)
+        log.y[7:, 0] += 50.0
+        box = HPolytope.box(x0 - 1.0, x0 + 1.0)
+        a, b = make(one, box), make(two, box)
+        here, there = a.run(log), b.run(log)
+        assert here.verdicts == there.verdicts
+        assert here.verdicts[-1] == "falsified"
+        np.testing.assert_array_equal(here.lower, there.lower)
+        np.testing.assert_array_equal(here.upper, there.upper)
+        left, right = ({k: v for k, v in o.state_dict().items() if not k.startswith("seal.")} for o in (a, b))
+        for name, value in left.items():
+            assert np.asarray(value).tobytes() == np.asarray(right[name]).tobytes(), name

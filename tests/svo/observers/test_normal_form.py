@@ -33,8 +33,6 @@ def box_about(rng: np.random.Generator, x0: np.ndarray) -> HPolytope:
 def run_of(rng: np.random.Generator, samples: int = 14) -> tuple[UncertainModel, HPolytope, Any]:
     """A plant, its first set, and a log that is healthy or corrupted."""
     model = varied_plant(rng)
-    if model.disturbance_polytope is not None:
-        model = model.replace(w=model.bounds(model.schedule)[:2])
     x0 = rng.uniform(-1.0, 1.0, model.n_states) * (rng.random(model.n_states) < 0.8)
     schedule = rng.uniform(0, 1, samples) if model.is_scheduled else None
     u = rng.normal(size=(samples, model.n_inputs))

