@@ -2,7 +2,8 @@
 
 Each kind of input gets its share of the cases; ``--kind "csv logs"`` takes one. A case that fails is printed with what
 repeats it: ``python -m tests.fuzz --kind KIND --seed SEED --first I --cases 1``. Ends on the count of cases and
-failures; exit code 1 if anything was wrong, a traceback, a hang over 30 s or more than 1 GB.
+failures; exit code 1 if anything was wrong, a traceback, a hang (more than 30 s of computing, or 5 minutes by the
+clock) or more than 1 GB.
 """
 
 from __future__ import annotations

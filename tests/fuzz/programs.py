@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +12,7 @@ from typer.testing import CliRunner
 
 from svo.cli import app
 from tests.fuzz import files, records
+from tests.fuzz.limits import BYTES, Limit, most_memory
 from tests.fuzz.outcome import ROOT, WrongError
 
 WORDS = [
@@ -68,8 +68,6 @@ COMMANDS = [
     "watch",
     "--version",
 ]
-LIMIT = 30.0  # seconds
-MEMORY = 2**30  # bytes, beside what importing takes
 
 
 def _arguments(rng: np.random.Generator, folder: Path) -> list[str]:
@@ -118,16 +116,29 @@ def command(rng: np.random.Generator, folder: Path) -> None:
         [sys.executable, "-m", "svo", *arguments], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip
-    try:
-        _, errors = process.communicate(timeout=LIMIT)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.communicate()
-        raise WrongError(f"more than {LIMIT:.0f} s: svo {' '.join(arguments)}") from None
+    errors, most = watched(process, f"svo {' '.join(arguments)}")
     if b"Traceback" in errors or process.returncode not in (0, 1, 2):
         raise WrongError(f"svo {' '.join(arguments)} ended with {process.returncode}: {errors[-300:]!r}")
-    if resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 > MEMORY:
-        raise WrongError(f"more than {MEMORY} bytes: svo {' '.join(arguments)}")
+    if most > BYTES:
+        raise WrongError(f"{most / BYTES:.2f} GB: svo {' '.join(arguments)}")
+
+
+def watched(process: subprocess.Popen[bytes], what: str) -> tuple[bytes, int]:
+    """What a command wrote to its errors, and the most memory that it held, in bytes.
+
+    Of the process itself while it runs: what the system says of children that have ended is the most of all of them,
+    and counts what their parent held when it started them.
+    """
+    most, limit = 0, Limit(process.pid)
+    while True:
+        try:
+            return process.communicate(timeout=0.05)[1], most
+        except subprocess.TimeoutExpired:
+            most = max(most, most_memory(process.pid))
+        if limit.passed():
+            process.kill()
+            process.communicate()
+            raise WrongError(f"{limit}: {what}")
 
 
 def _keep(kind: object, rng: np.random.Generator, folder: Path) -> None:

@@ -8,15 +8,13 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
 import numpy as np
 
+from tests.fuzz.limits import BYTES, SECONDS, Limit
 from tests.fuzz.outcome import verdict_of
 
-SECONDS = 30.0
-BYTES = 2**30  # beside what the imports and compiled code take
 Job = tuple[str, int]  # kind and seed
 
 
@@ -37,7 +35,7 @@ def _work(connection: Connection) -> None:
     for kind in ("api calls", "descriptions", "csv logs", "mat files", "parquet logs", "alarm files", "study folders"):
         try_case(kind, 0)  # imports and compiled code are not the case's
     taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (taken + BYTES, taken + BYTES))
+    resource.setrlimit(resource.RLIMIT_AS, (taken + BYTES, taken + BYTES))  # beside imports and compiled code
     connection.send(None)
     while True:
         connection.send(try_case(*connection.recv()))
@@ -53,10 +51,10 @@ class Worker:
         self.process.start()
         other.close()
         self.job: Job | None = None
-        self.end = monotonic() + 10 * SECONDS
+        self.limit = Limit(self.process.pid or 0, 10 * SECONDS)
 
     def give(self, job: Job) -> None:
-        self.job, self.end = job, monotonic() + SECONDS
+        self.job, self.limit = job, Limit(self.process.pid or 0)
         self.connection.send(job)
 
     def stop(self) -> None:
@@ -79,8 +77,8 @@ def run(jobs: Iterable[Job], processes: int) -> Iterator[tuple[Job, str | None]]
                     worker.process.join()
                     failure = f"the process died with {worker.process.exitcode}"
                     workers[i] = _replaced(worker)
-            elif monotonic() > worker.end:
-                failure = f"more than {SECONDS:.0f} s"
+            elif worker.limit.passed():
+                failure = str(worker.limit)
                 workers[i] = _replaced(worker)
             else:
                 continue

@@ -4,6 +4,7 @@ made of."""
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -85,13 +86,13 @@ class WindowMemory:
         na = max(len(self._template), len(self._anchor.rows))
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
         largest = _LARGEST_BASIS if self.horizon is not None else _LARGEST_GROWING_BASIS
-        self._size = kernel.Sizes(
+        size = kernel.Sizes(
             n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
             nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps, block=self._block,
             K=min(rows, columns, largest) + 2, late=int(self._late),
         )  # fmt: skip
-        _check_room(self._size)
-        w = self._arrays = kernel.allocate(self._size)
+        w, self._size = _room_for(size), size
+        self._arrays = w
         w["T"][:n] = np.eye(n)
         w["T"][n:] = self._template
         w["owner"][:] = self._owner
@@ -140,6 +141,15 @@ class WindowMemory:
             return given
         newest = replace(given.samples[-1], y=np.where(beyond, self._reading, given.samples[-1].y))
         return replace(given, samples=(*given.samples[:-1], newest))
+
+
+def _room_for(size: kernel.Sizes) -> dict[str, Any]:
+    """The arrays of a window, or an error that names the horizon, also where the machine has no room for them."""
+    _check_room(size)
+    try:
+        return kernel.allocate(size)
+    except MemoryError as error:
+        raise ValueError(f"horizon makes a window of {size.N} steps ({error}); expected a shorter one") from None
 
 
 def _check_room(size: kernel.Sizes) -> None:

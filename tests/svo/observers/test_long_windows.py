@@ -154,3 +154,28 @@ def test_a_longer_window_is_never_wider(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(40))
 def test_a_longer_window_is_never_wider_of_many_plants(seed: int) -> None:
     check_a_longer_window_is_never_wider(seed)
+
+
+def test_no_room_for_a_longer_window_is_one_error_and_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the machine has too little memory for a window that no limit forbids."""
+    model, box = large_plant(1, 4), HPolytope.box(-np.ones(4), np.ones(4))
+    log = log_of(model, 1, 20)
+    observer, other = WindowObserver(model, box, None), WindowObserver(model, box, None)
+
+    def no_room(size: object) -> None:
+        raise MemoryError("Unable to allocate 9 GiB")
+
+    for k, y in enumerate(log.y):
+        expected = other.update(y) if k == 0 else other.step(None, y)
+        if other._size.N > observer._size.N:
+            before = {name: value.tobytes() for name, value in observer.state_dict().items()}
+            with monkeypatch.context() as scarce:
+                scarce.setattr("svo.observers.window_kernel.allocate", no_room)
+                with pytest.raises(ValueError, match=r"of 32 steps \(Unable to allocate 9 GiB\); expected a"):
+                    observer.step(None, y)
+                with pytest.raises(ValueError, match="horizon makes a window of 699 steps"):
+                    WindowObserver(model, box, 500)
+            assert before == {name: value.tobytes() for name, value in observer.state_dict().items()}
+        step = observer.update(y) if k == 0 else observer.step(None, y)
+        assert np.array_equal(step.box, expected.box)
+    assert observer._size.N == 32
