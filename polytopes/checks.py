@@ -9,14 +9,15 @@ expected, and what to do.
 import math
 import operator
 import warnings
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Shape = tuple[int | str, ...]  # a name stands for any size
+Item = TypeVar("Item")
 
 _EXACT = 2**53  # integers up to here are floats
 _NUMBERS = "biuf"  # kinds of dtypes: truth values, integers, floats
@@ -105,6 +106,18 @@ def different_coordinates(name: str, value: Any, dim: int) -> list[int]:
     if not found or len(set(found)) != len(found) or not all(0 <= j < dim for j in found):
         raise ValueError(f"{name} is {found}; expected different coordinates below {dim}, at least one.")
     return found
+
+
+def listed(name: str, value: Any, kind: type[Item]) -> list[Item]:
+    """What a sequence holds, each item of one kind; TypeError otherwise. A mapping is none: its keys are not meant."""
+    expected = f"expected a sequence of {kind.__name__}"
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise TypeError(f"{name} is {_kind_of(value)}; {expected}.")
+    items = list(value)
+    for i, item in enumerate(items):
+        if not isinstance(item, kind):
+            raise TypeError(f"{name}[{i}] is {_kind_of(item)}; {expected}.")
+    return items
 
 
 def _is_float_array(value: Any) -> bool:

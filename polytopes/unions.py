@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes.checks import real_array
+from polytopes.checks import listed, real_array
 from polytopes.generators import in_integers
 from polytopes.hpolytope import HPolytope
 from polytopes.hull import outer_rows
@@ -35,8 +35,7 @@ def convex_hull(sets: Sequence[HPolytope]) -> HPolytope:
     UndecidedError
         If a set is unbounded and the double description of it or of the hull too large.
     """
-    _checked(sets)
-    return HPolytope(*_hull_rows(sets))
+    return HPolytope(*_hull_rows(_checked(sets)))
 
 
 def _hull_rows(sets: Sequence[Rows]) -> Table:
@@ -70,7 +69,8 @@ def union_bounds(sets: Sequence[HPolytope], directions: ArrayLike | None = None)
     directions : array_like (k, n), optional
         The normals T; those of a box if absent.
     """
-    n = _checked(sets)
+    sets = _checked(sets)
+    n = sets[0].dim
     normals = (
         np.vstack([np.eye(n), -np.eye(n)]) if directions is None else real_array("directions", directions, ("k", n))
     )
@@ -82,10 +82,11 @@ def union_bounds(sets: Sequence[HPolytope], directions: ArrayLike | None = None)
     return HPolytope(normals[finite], offsets[finite])
 
 
-def _checked(sets: Sequence[HPolytope]) -> int:
-    """The dimension of the sets."""
-    if not sets:
+def _checked(sets: Sequence[HPolytope]) -> list[HPolytope]:
+    """The sets, at least one, in one space."""
+    given = listed("sets", sets, HPolytope)
+    if not given:
         raise ValueError("sets is empty; expected at least one HPolytope.")
-    for P in sets:
-        same_space(sets[0], P)
-    return sets[0].dim
+    for P in given:
+        same_space(given[0], P)
+    return given

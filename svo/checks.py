@@ -8,7 +8,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes.checks import Shape, real_array, real_number, whole_number
+from polytopes.checks import Shape, listed, real_array, real_number, whole_number
 
 __all__ = [
     "Array",
@@ -18,6 +18,7 @@ __all__ = [
     "floats",
     "is_count",
     "is_finite_number",
+    "listed",
     "optional_import",
     "positive_number",
     "readings",

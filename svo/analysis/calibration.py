@@ -20,7 +20,7 @@ from svo.analysis.lifted_rows import bounding_box
 from svo.analysis.trajectory import Trajectory
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm
 
 _ROOM = 1e-6  # relative: of bounds that are wide enough while the first sample of another is looked for
@@ -204,6 +204,7 @@ def _no_explanation(chosen: Sequence[Bound], first: int, count: int, is_exact: b
 
 
 def _check_log(model: UncertainModel, log: Log) -> None:
+    expect_model("model", model)
     if not isinstance(log, Log):
         raise TypeError(f"log is {type(log).__name__}; expected an svo.Log")
     if len(log) == 0:

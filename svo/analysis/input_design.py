@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.model_pair import LEAST_SEPARATION, ModelPair
-from svo.checks import Array, finite_array, is_finite_number
-from svo.models.model import UncertainModel
+from svo.checks import Array, finite_array, is_finite_number, listed
+from svo.models.model import UncertainModel, expect_model
 
 _ROUNDS = 60
 _DECREASE = 1e-4  # of the energy, relative, below which the iteration stops
@@ -127,7 +127,9 @@ def design_input(
     The answer holds for exactly these inputs, and for whatever first states, disturbances, noises and Deltas within
     their bounds. Where products with Delta are relaxed it is sufficient, as `distinguishability` tells.
     """
-    observers = [observer_models] if isinstance(observer_models, UncertainModel) else list(observer_models)
+    expect_model("plant_model", plant_model)
+    models = [observer_models] if isinstance(observer_models, UncertainModel) else observer_models
+    observers = listed("observer_models", models, UncertainModel)
     sets = _sets(observer_initial, initial, len(observers))
     _check_numbers(horizon, hold, margin)
     given = _reference(reference, horizon, plant_model.n_inputs)
@@ -315,9 +317,10 @@ def _sets(given: HPolytope | Sequence[HPolytope] | None, initial: HPolytope, cou
     """One set of first states an observer."""
     if given is None or isinstance(given, HPolytope):
         return [given or initial] * count
-    if len(given) != count:
-        raise ValueError(f"observer_initial has {len(given)} sets; expected {count}, one an observer's model")
-    return list(given)
+    sets = listed("observer_initial", given, HPolytope)
+    if len(sets) != count:
+        raise ValueError(f"observer_initial has {len(sets)} sets; expected {count}, one an observer's model")
+    return sets
 
 
 def _check_numbers(horizon: int, hold: int, margin: float) -> None:

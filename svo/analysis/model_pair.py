@@ -15,7 +15,7 @@ from svo.analysis.lifted_rows import LiftedSample, bounding_box, evaluate_with_r
 from svo.analysis.reachable_set import ReachableSet, product_bounds
 from svo.analysis.sparse_program import Columns, Solution, SparseProgram
 from svo.checks import Array, finite_array
-from svo.models.model import UncertainModel
+from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm, exponents_of, set_in
 
 # In noise widths (for exact sensors: in units of the output). Above what an observer's rounding slack can explain.
@@ -65,6 +65,8 @@ class ModelPair:
         u: ArrayLike | HPolytope | None,
         schedule: ArrayLike | None,
     ) -> None:
+        expect_model("plant_model", plant)
+        expect_model("observer_model", observer)
         if not isinstance(horizon, int | np.integer) or horizon < 1:
             raise ValueError(f"horizon is {horizon!r}; expected a number of samples >= 1")
         if (plant.n_inputs, plant.n_outputs) != (observer.n_inputs, observer.n_outputs):

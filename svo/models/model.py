@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
-from svo.checks import Array, finite_array, positive_number
+from svo.checks import Array, finite_array, listed, positive_number
 from svo.logs.log import Log
 from svo.models.bounds import Bounds, bounds_of
 from svo.models.discretisation import check_constant
@@ -105,7 +105,7 @@ class UncertainModel:
     start_range: StateRange | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "uncertainties", tuple(self.uncertainties))
+        object.__setattr__(self, "uncertainties", tuple(listed("uncertainties", self.uncertainties, Uncertainty)))
         object.__setattr__(self, "Ts", positive_number("Ts", self.Ts, "sampling time in seconds"))
         object.__setattr__(self, "layout", Layout.of(self, self.schedule))
         n = self.layout.n
@@ -379,3 +379,9 @@ class UncertainModel:
             x = total[:n] @ known
         time: Array = np.arange(len(inputs), dtype=float) * self.Ts
         return Log(time=time, u=inputs, y=np.array(outputs), x=np.array(states), schedule=values)
+
+
+def expect_model(name: str, value: Any) -> None:
+    """TypeError unless it is a model."""
+    if not isinstance(value, UncertainModel):
+        raise TypeError(f"{name} is {type(value).__name__}; expected an UncertainModel")

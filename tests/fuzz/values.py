@@ -169,6 +169,7 @@ def nasty(rng: np.random.Generator) -> Any:
         lambda: b"bytes",
         lambda: {},
         lambda: {"a": 1},
+        lambda: {0: 1},
         lambda: set(),
         lambda: [],
         lambda: [[]],

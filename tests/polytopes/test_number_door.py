@@ -184,3 +184,23 @@ def test_every_door_of_a_set_is_the_same(call: Any, value: Any) -> None:
 def test_counts_and_coordinates_are_checked(call: Any) -> None:
     with pytest.raises((TypeError, ValueError), match="expected"):
         call()
+
+
+@pytest.mark.parametrize("function", [convex_hull, union_bounds])
+def test_sets_come_in_a_sequence_and_in_nothing_else(function: Any) -> None:
+    P = HPolytope.box([-1.0], [1.0])
+    for given, error, words in (
+        ({"a": P}, TypeError, "sets is a dict; expected a sequence of HPolytope"),
+        ({0: P}, TypeError, "sets is a dict"),
+        (P, TypeError, "sets is a polytopes.hpolytope.HPolytope; expected a sequence"),
+        ("text", TypeError, "sets is a str"),
+        (None, TypeError, "sets is a NoneType"),
+        ([P, 3], TypeError, r"sets\[1\] is a int"),
+        ([[P]], TypeError, r"sets\[0\] is a list"),
+        (np.array([], dtype=object), ValueError, "sets is empty"),
+        ([P, HPolytope.box([-1.0, -1.0], [1.0, 1.0])], ValueError, "dimension 2; expected 1"),
+    ):
+        with pytest.raises(error, match=words):
+            function(given)
+    for given in ([P, P], (P,), iter([P, P]), np.array([P, P], dtype=object)):
+        assert function(given).equals(P)

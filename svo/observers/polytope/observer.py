@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope, warm_up
 from svo.checks import Array, is_count, is_finite_number
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm, set_in
 from svo.models.stack import may_be_nonzero
 from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at, steps_of
@@ -91,8 +91,7 @@ class PolytopeObserver(RestartingPolytope):
         eps: float = 1e-9,
         as_published: bool = False,
     ) -> None:
-        if not isinstance(model, UncertainModel):
-            raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
+        expect_model("model", model)
         if not is_count(horizon, 1):
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1")
         if not (is_finite_number(eps) and eps >= 0):

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from polytopes import HPolytope
 from svo.checks import Array, is_count, is_finite_number
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm
 from svo.observers import window_kernel as kernel
 from svo.observers.base import VerdictName
@@ -80,8 +80,7 @@ class WindowObserver(RestartingWindow):
         eps: float = 1e-9,
         sign_split: int = 0,
     ) -> None:
-        if not isinstance(model, UncertainModel):
-            raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
+        expect_model("model", model)
         if horizon is not None and not is_count(horizon, 1):
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
         if not (is_finite_number(eps) and eps >= 0):

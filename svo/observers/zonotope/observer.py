@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from polytopes import HPolytope
 from svo.checks import Array, is_count, is_finite_number
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm
 from svo.observers.base import VerdictName
 from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at, steps_of
@@ -71,8 +71,7 @@ class ConstrainedZonotopeObserver:
         max_constraints: int | None = None,
         eps: float = 1e-9,
     ) -> None:
-        if not isinstance(model, UncertainModel):
-            raise TypeError(f"model is {type(model).__name__}; expected an UncertainModel")
+        expect_model("model", model)
         if not (is_finite_number(eps) and eps >= 0):
             raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
         n = model.n_states
