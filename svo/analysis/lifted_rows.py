@@ -15,6 +15,7 @@ from polytopes import HPolytope
 from svo.analysis.sparse_program import Columns, SparseProgram, Terms
 from svo.checks import Array
 from svo.models.model import UncertainModel
+from svo.models.normal_form import Integers, power
 from svo.observers.window_kernel import channel_count, channel_factors
 
 
@@ -65,8 +66,16 @@ def evaluate(model: UncertainModel, schedule: Any) -> tuple[Array, tuple[Channel
     return evaluate_with_rest(model, schedule)[:2]
 
 
-def evaluate_with_rest(model: UncertainModel, schedule: Any) -> tuple[Array, tuple[Channel, ...], Array]:
+def evaluate_with_rest(
+    model: UncertainModel, schedule: Any, shift: tuple[Integers, Integers] | None = None
+) -> tuple[Array, tuple[Channel, ...], Array]:
     """`evaluate`, and what it leaves out.
+
+    Parameters
+    ----------
+    shift : (rows, columns), optional
+        Exponents of the units of [x(k+1); y(k)] and (x, u, 1, w) in which the uncertainties are taken apart, beyond
+        those of the model: those of an observer whose channels these shall be. Other units give other channels.
 
     Returns
     -------
@@ -78,15 +87,18 @@ def evaluate_with_rest(model: UncertainModel, schedule: Any) -> tuple[Array, tup
         Bound of what the channels leave out of their uncertainties, times |Delta|, entry by entry.
     """
     stacks = model.stack(schedule)
+    rows, columns = (power(e) for e in shift) if shift else (np.ones(size) for size in stacks.shape[1:])
     total, left, channels = stacks[0].copy(), np.zeros_like(stacks[0]), []
     for i, (item, uncertainty) in enumerate(zip(stacks[1:], model.uncertainties, strict=True)):
         lo, hi = uncertainty.bounds
         if lo == hi:
             total += lo * item
             continue
+        item = item * columns / rows[:, None]
         owner = np.ones(channel_count(item), dtype=np.int64)
         delta = np.tile([[lo, hi]], (len(owner), 1))
         gains, functionals, rest, _ = channel_factors(np.stack([item, item]), owner, delta)
+        gains, functionals, rest = gains * rows, functionals / columns, rest * rows[:, None] / columns
         channels += [Channel(i, gain, functional, lo, hi) for gain, functional in zip(gains, functionals, strict=True)]
         left += rest
     return total, tuple(channels), left

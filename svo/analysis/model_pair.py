@@ -16,7 +16,7 @@ from svo.analysis.reachable_set import ReachableSet, product_bounds
 from svo.analysis.sparse_program import Columns, Solution, SparseProgram
 from svo.checks import Array, finite_array
 from svo.models.model import UncertainModel, expect_model
-from svo.models.normal_form import NormalForm, exponents_of, set_in
+from svo.models.normal_form import Integers, NormalForm, exponents_of, set_in
 
 # In noise widths (for exact sensors: in units of the output). Above what an observer's rounding slack can explain.
 LEAST_SEPARATION = 1e-6
@@ -81,7 +81,10 @@ class ModelPair:
             for name, P, m in (("initial", initial, plant), ("observer_initial", observer_initial, observer))
         ]
         shared = exponents_of(plant, *boxes[0])
-        own = replace(exponents_of(observer, *boxes[1]), inputs=shared.inputs, outputs=shared.outputs)
+        alone = exponents_of(observer, *boxes[1])
+        own = replace(alone, inputs=shared.inputs, outputs=shared.outputs)
+        # An uncertainty of rank two comes apart as in the observer, whatever units the two models share.
+        self._shifts = None, (alone.rows - own.rows, alone.columns - own.columns)
         self._forms = NormalForm(plant, shared), NormalForm(observer, own)
         self._models = tuple(form.model for form in self._forms)
         self._initial = tuple(
@@ -109,7 +112,8 @@ class ModelPair:
         program = SparseProgram()
         widening, one = program.columns(least, np.inf), program.columns(1.0, 1.0)
         u = [self._input_columns(program, k) for k in range(samples)]
-        sides = [_Side(program, m, P, box) for m, P, box in zip(self._models, self._initial, self._boxes, strict=True)]
+        each = zip(self._models, self._initial, self._boxes, self._shifts, strict=True)
+        sides = [_Side(program, *of) for of in each]
         for k in range(samples):
             for side in sides:
                 side.add(u[k], (self._inputs[0][k], self._inputs[1][k]), one, self._schedule[k], k + 1 == samples)
@@ -132,17 +136,22 @@ class _Side:
     """Variables and rows of one of the two models, sample by sample."""
 
     def __init__(
-        self, program: SparseProgram, model: UncertainModel, initial: HPolytope, box: tuple[Array, Array]
+        self,
+        program: SparseProgram,
+        model: UncertainModel,
+        initial: HPolytope,
+        box: tuple[Array, Array],
+        shift: tuple[Integers, Integers] | None,
     ) -> None:
         self.model, self.exact, self.samples = model, True, list[LiftedSample]()
-        self._program, self._reachable = program, ReachableSet(*box)
+        self._program, self._reachable, self._shift = program, ReachableSet(*box), shift
         self._x = program.columns(*self._reachable.box(), implied=True)
         set_rows(program, self._x, initial)
 
     def add(self, u: Columns, u_box: tuple[Array, Array], one: Columns, schedule: Any, last: bool) -> None:
         model, program = self.model, self._program
         lower, upper, noise = model.bounds(schedule)
-        stack, channels, left = evaluate_with_rest(model, schedule)
+        stack, channels, left = evaluate_with_rest(model, schedule, self._shift)
         w = program.columns(lower, upper)
         if model.disturbance_polytope is not None:
             set_rows(program, w, model.disturbance_polytope)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from polytopes import HPolytope
 from svo import Distinguishability, UncertainModel, Uncertainty, WindowObserver, distinguishability
-from svo.analysis.model_pair import Explanation
+from svo.analysis.model_pair import Explanation, ModelPair
 from svo.cli import app
 from tests.svo.observers.random_plants import random_plant
 
@@ -232,3 +232,27 @@ def test_a_separation_of_a_ten_thousandth_of_the_noise_is_seen(share: float) -> 
     answer = distinguishability(faulty, integrator(), 3, initial=POINT, u=np.zeros((3, 1)))
     assert (answer.horizon, answer.exact, answer.witness) == (1, True, None)
     assert answer.separation == pytest.approx(share, rel=1e-2)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_uncertainty_of_rank_two_comes_apart_as_in_the_observer(seed: int) -> None:
+    """Each of its terms has a Delta of its own, so that other terms would promise what this observer does not keep."""
+    rng = np.random.default_rng(seed)
+    item = Uncertainty(A=rng.normal(size=(3, 3)), C=rng.normal(size=(1, 3)))
+    observer = UncertainModel(
+        np.eye(3), None, np.ones((1, 3)), E=np.eye(3), w=[0.1] * 3, n=[30.0], uncertainties=[item]
+    )
+    plant = observer.replace(n=[0.01], uncertainties=[])
+    start = HPolytope.box([-1e-3, -1.0, -50.0], [1e-3, 1.0, 50.0])
+    pair = ModelPair(plant, observer, 1, start, start, None, None)
+    channels = pair.solve(1).observer.samples[0].channels
+    window = WindowObserver(observer, start)
+    window.update([0.0])
+    form = window._form
+    own = pair._forms[1].exponents
+    rows, columns = form.exponents.rows - own.rows, form.exponents.columns - own.columns
+    assert rows[3] != 0  # the outputs have other units than in the pair
+    assert len(channels) == 3
+    for q, channel in enumerate(channels):
+        np.testing.assert_array_equal(channel.gain, np.ldexp(window._arrays["gain"][0, q], rows))
+        np.testing.assert_array_equal(channel.functional, np.ldexp(window._arrays["functional"][0, q], -columns))
