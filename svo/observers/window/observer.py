@@ -301,7 +301,7 @@ class WindowObserver(RestartingWindow):
         other.update(y, u, schedule)
         other.step(u, y, u, schedule).box  # noqa: B018
         other.step(u, y, u, schedule, deadline=0.0)
-        other.late_update(y, 0)
+        other.late_update(y, other.window[0])
         kernel.channel_factors(self._form.model.stack(schedule), self._owner, self._arrays["delta"])
         return perf_counter() - begun
 

@@ -286,9 +286,10 @@ def test_nothing_compiles_after_warm_up() -> None:
     assert [len(f.signatures) for f in functions] == before
 
 
-def test_warm_up_leaves_the_observer_alone() -> None:
+@pytest.mark.parametrize("horizon", [1, 2, 10, None])
+def test_warm_up_leaves_the_observer_alone(horizon: int | None) -> None:
     model, log = flown()
-    observer, twin = (WindowObserver(model, BOX) for _ in range(2))
+    observer, twin = (WindowObserver(model, BOX, horizon) for _ in range(2))
     run_all(observer, log)
     run_all(twin, log)
     observer.warm_up()
