@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from time import perf_counter
 
 import numpy as np
@@ -20,9 +21,9 @@ from svo.interval import (
     first_order_schedule,
 )
 from svo.interval.identification import FirstOrderFit, identify_first_order
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.window.observer import WindowObserver
-from svo.observers.window.step import WindowStep
 
 SAFETY = 1.2
 QBAR = 200
@@ -122,11 +123,11 @@ def run_observer(
     """The same as `run_interval` for a set-valued observer; it starts again from a wide set after a falsification."""
     log = first_order_schedule(predictor(fit, healthy).predict(healthy))
     observer = _observer(noise, log, horizon)
-    model, calm, at, seconds = observer.model, set(), {}, []
+    model, calm, at, seconds, answers = observer.model, set(), {}, [], drive(observer, log)
     for k in range(len(log)):
         if k in instants:
             at[k] = observer.state_dict()
-        step = _advance(observer, log, k)
+        step = next(answers)
         seconds.append(step.seconds)
         if step.verdict == "falsified":
             calm.add(k)
@@ -157,20 +158,15 @@ def _start_again(observer: WindowObserver, log: Log, k: int) -> None:
     observer.update(log.y[k], u=log.u[k], schedule=log.schedule_at(k))
 
 
-def _advance(observer: WindowObserver, log: Log, k: int) -> WindowStep:
-    if k == 0:
-        return observer.update(log.y[k], u=log.u[k], schedule=log.schedule_at(k))
-    return observer.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=log.schedule_at(k))
-
-
 def _explains(observer: WindowObserver, log: Log) -> bool:
-    return all(_advance(observer, log, k).verdict != "falsified" for k in range(len(log)))
+    return all(step.verdict != "falsified" for step in drive(observer, log))
 
 
 def _delay(observer: WindowObserver, log: Log, fault: Fault, instant: int, calm: set[int]) -> float:
     faulty = replace(fault(log, instant), schedule=log.schedule)
-    for k in range(instant, min(len(log), instant + round(PATIENCE_S / Ts))):
-        if _advance(observer, faulty, k).verdict == "falsified":
+    answers = islice(drive(observer, faulty, start=instant), round(PATIENCE_S / Ts))
+    for k, step in enumerate(answers, instant):
+        if step.verdict == "falsified":
             if k not in calm:
                 return (k - instant + 1) * Ts
             _start_again(observer, faulty, k)

@@ -23,7 +23,7 @@ from benchmarks._window_references import (
     Query,
     ScaledSamples,
 )
-from benchmarks._window_runs import HORIZON, SETTLE, TURN, Sample, Times, drive, observer_of
+from benchmarks._window_runs import HORIZON, SETTLE, TURN, Sample, Times, observer_of, sampler
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers import window_kernel as kernel
@@ -59,7 +59,7 @@ class Recording:
 
 def record(observer: WindowObserver, log: Log) -> Recording:
     """Run a fresh observer once and keep what the other solvers need to solve the same windows."""
-    sample, arrays, size = drive(observer, log), observer._arrays, observer._size
+    sample, arrays, size = sampler(observer, log), observer._arrays, observer._size
     queries, boxes, answers, slack = [], [], [], []
     new = arrays["new_upper"], arrays["new_lower"]
     for k in range(len(log)):
@@ -95,7 +95,7 @@ def compete(model: UncertainModel, log: Log, schedule: str) -> Contest:
     recording = record(observer_of(model, schedule=schedule), log)
     samples, boxes, centre, unit = recording.scaled(model)
     methods = {
-        "ours": (drive(observer_of(model, schedule=schedule), log), 1),
+        "ours": (sampler(observer_of(model, schedule=schedule), log), 1),
         "HiGHS, warm": (highs(samples, recording, boxes, PRIMAL, rebuild=False), 1),
         "HiGHS, warm, default options": (highs(samples, recording, boxes, DEFAULT, rebuild=False), 1),
         "HiGHS, rebuilt": (highs(samples, recording, boxes, DUAL, rebuild=True), 1),

@@ -15,7 +15,7 @@ from numba.core import event
 from rich.table import Table
 
 from aircraft.eclipse.plant import Eclipse
-from benchmarks._window_runs import HORIZON, NOISE, SCHEDULES, SEED, SETTLE, TURN, Sample, Times, drive, observer_of
+from benchmarks._window_runs import HORIZON, NOISE, SCHEDULES, SEED, SETTLE, TURN, Sample, Times, observer_of, sampler
 from svo.isolation.bank import Bank
 from svo.logs.log import Log
 from svo.observers.window.observer import WindowObserver
@@ -27,7 +27,7 @@ def alone(start: Callable[[], WindowObserver | Bank], logs: list[Log], between: 
     """An observer or a bank by itself over several logs, with something done between its samples."""
     times = Times()
     for i, log in enumerate(logs):
-        sample = drive(start(), log)
+        sample = sampler(start(), log)
         for k in range(len(log)):
             between()
             if k < SETTLE:
@@ -69,9 +69,9 @@ def grow(plant: Eclipse, log: Log) -> dict[str, dict[int, Times]]:
     runners: dict[tuple[str, int], Sample] = {}
     for N in HORIZONS:
         models = plant.models(NOISE)
-        runners["nominal", N] = drive(observer_of(models["nominal"], N), log)
-        runners["dynamics (a channel)", N] = drive(observer_of(models["dynamics"], N), log)
-        runners["bank of four", N] = drive(replace(plant, horizon=N).bank(NOISE), log)
+        runners["nominal", N] = sampler(observer_of(models["nominal"], N), log)
+        runners["dynamics (a channel)", N] = sampler(observer_of(models["dynamics"], N), log)
+        runners["bank of four", N] = sampler(replace(plant, horizon=N).bank(NOISE), log)
     result: dict[str, dict[int, Times]] = {}
     for start in range(0, len(log), TURN):
         for (name, N), sample in runners.items():

@@ -12,6 +12,7 @@ from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER
 from benchmarks._window_references import Floats
 from polytopes import HPolytope
 from svo.isolation.bank import Bank
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers.window.observer import WindowObserver
@@ -55,13 +56,7 @@ def observer_of(model: UncertainModel, horizon: int = HORIZON, schedule: str = "
     return observer
 
 
-def drive(observer: WindowObserver | Bank, log: Log) -> Sample:
-    """A function that gives an observer or a bank sample k of a log."""
-    u, y, schedule = list(log.u), list(log.y), [log.schedule_at(k) for k in range(len(log))]
-
-    def sample(k: int) -> object:
-        if k == 0:
-            return observer.update(y[0], schedule=schedule[0])
-        return observer.step(u[k - 1], y[k], schedule=schedule[k])
-
-    return sample
+def sampler(observer: WindowObserver | Bank, log: Log) -> Sample:
+    """A function that gives an observer or a bank the samples k = 0, 1, ... of a log."""
+    answers = drive(observer, log)
+    return lambda k: next(answers)

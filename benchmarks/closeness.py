@@ -22,6 +22,7 @@ from benchmarks._observers import OBSERVERS, arguments, console, linear_plant, o
 from polytopes import HPolytope
 from svo import UncertainModel
 from svo.faults import Ramp, SensorFault, Step
+from svo.logs.drive import drive
 from svo.logs.log import Log
 
 SEED, SAMPLES, FAULT_AT, HORIZONS = 20_261_126, 45, 15, (1, 2, 5, 10, 20)
@@ -61,8 +62,7 @@ def faulty_log(rng: np.random.Generator, n: int) -> tuple[UncertainModel, Log]:
 
 def first_alarm(observer: Any, log: Log, tally: Tally) -> float:
     """Sample of the alarm, or infinity."""
-    for k in range(len(log)):
-        step = observer.update(log.y[k]) if k == 0 else observer.step(None, log.y[k])
+    for k, step in enumerate(drive(observer, log)):
         tally.answers += 1
         tally.undecided += step.verdict == "undecided"
         if step.verdict == "falsified":

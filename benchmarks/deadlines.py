@@ -18,6 +18,7 @@ from rich.progress import track
 from aircraft.eclipse.plant import Eclipse
 from benchmarks._observers import arguments, console, table
 from benchmarks._window_runs import NOISE, SEED, SETTLE
+from svo.logs.drive import drive
 
 HORIZONS, BOX_EVERY = (10, 50), 10
 DEADLINES = (None, 2e-3, 1e-3, 0.5e-3, 0.25e-3, 1e-6)  # seconds
@@ -37,13 +38,11 @@ def main(given: list[str] | None = None) -> None:
         for flight in range(options.flights):
             log = plant.simulate("none", "none", NOISE, SEED + flight)
             banks = {deadline: replace(plant, horizon=N).bank(NOISE) for deadline in DEADLINES}
+            answers = {deadline: drive(bank, log, deadline=deadline) for deadline, bank in banks.items()}
             for k in track(range(len(log)), f"N = {N}", console=console, transient=True):
-                for deadline, bank in banks.items():
+                for deadline, verdicts in answers.items():
                     begun = perf_counter()
-                    if k == 0:
-                        verdict = bank.update(log.y[0], schedule=log.schedule_at(0))
-                    else:
-                        verdict = bank.step(log.u[k - 1], log.y[k], schedule=log.schedule_at(k), deadline=deadline)
+                    verdict = next(verdicts)
                     if k >= SETTLE:
                         seconds[deadline].append(perf_counter() - begun)
                         undecided[deadline] += sum(step.verdict == "undecided" for step in verdict.steps.values())
@@ -52,13 +51,13 @@ def main(given: list[str] | None = None) -> None:
                             widths[deadline].append(upper - lower)
                     assert verdict.state == "nominal"
         for deadline in DEADLINES:
-            answers = len(seconds[deadline]) * len(banks[deadline].names)
+            said = len(seconds[deadline]) * len(banks[deadline].names)
             times = 1e3 * np.array(seconds[deadline])
             late = "-" if deadline is None else f"{np.median(np.maximum(times - 1e3 * deadline, 0.0)):.2f}"
             width = np.mean(np.array(widths[deadline]) / np.array(widths[None]))
             rows.append([
                 N, "none" if deadline is None else f"{1e3 * deadline:g}", f"{np.median(times):.2f}",
-                f"{np.quantile(times, 0.9):.2f}", late, f"{width:.3g}", f"{100.0 * undecided[deadline] / answers:.1f}",
+                f"{np.quantile(times, 0.9):.2f}", late, f"{width:.3g}", f"{100.0 * undecided[deadline] / said:.1f}",
             ])  # fmt: skip
     columns = ("N", "deadline, ms", "median, ms", "90 %, ms", "late, median ms", "width", "undecided, %")
     table(f"Bank of four, Eclipse, {options.flights} flight(s), {NOISE} noise", columns, rows)

@@ -28,6 +28,7 @@ from benchmarks._window_references import DUAL, PRIMAL, CvxpyWindow
 from benchmarks._window_runs import Times
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
+from svo.logs.drive import drive
 from svo.logs.log import Log
 
 SEED, SETTLE, SAMPLES = 20_261_128, 60, 160
@@ -41,9 +42,10 @@ def cost(observer: Any, log: Log) -> float:
     """Mean CPU microseconds of a step."""
     times: list[float] = []
     first = process_time_ns()
-    for k in range(len(log)):
+    answers = drive(observer, log)
+    for _ in range(len(log)):
         begun = process_time_ns()
-        step = observer.update(log.y[k]) if k == 0 else observer.step(None, log.y[k])
+        step = next(answers)
         times.append(1e-3 * (process_time_ns() - begun))
         assert step.verdict != "falsified"
         if 1e-9 * (process_time_ns() - first) > LONGEST:
@@ -124,11 +126,10 @@ def memory(rng: np.random.Generator, samples: int) -> tuple[list[int], list[floa
     x = np.zeros(2)
     for part in track(range(-(-samples // chunk)), "memory", console=console, transient=True):
         log = model.simulate(x, np.zeros((chunk + 1, 0)), rng)
-        for k in range(chunk):
-            step = observer.update(log.y[k]) if part == k == 0 else observer.step(None, log.y[k])
+        for step in drive(observer, log, start=int(part > 0)):
             assert step.verdict == "consistent"
         x = log.x[-1]
-        at.append((part + 1) * chunk)
+        at.append((part + 1) * chunk + 1)
         used.append(resident_megabytes())
     return at, used
 

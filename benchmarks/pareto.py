@@ -8,6 +8,7 @@ of the steps, boxes not read.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from time import process_time_ns
 from typing import Any
 
@@ -19,6 +20,7 @@ from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER, Eclipse
 from benchmarks._observers import arguments, console, output_directions, save, table
 from polytopes import HPolytope
 from svo import ConstrainedZonotopeObserver, WindowObserver
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.plant import first_faulty_sample
 
@@ -30,14 +32,10 @@ MARKERS = {"box": "o", "rows C A^-j": "s", ZONOTOPE: "^"}
 
 def fly(observer: Any, log: Log, y: np.ndarray, widths: bool) -> tuple[int | None, float, np.ndarray]:
     """First alarm, median microseconds and mean width of each state over a log."""
-    times, boxes, schedule = [], [], [log.schedule_at(k) for k in range(len(log))]
+    times, boxes, answers = [], [], drive(observer, replace(log, y=y))
     for k in range(len(log)):
         begun = process_time_ns()
-        step: Any = (
-            observer.update(y[k], schedule=schedule[k])
-            if k == 0
-            else observer.step(log.u[k - 1], y[k], schedule=schedule[k])
-        )
+        step = next(answers)
         times.append(1e-3 * (process_time_ns() - begun))
         if step.verdict == "falsified":
             return k, float(np.median(times[SETTLE:])), np.array(boxes)

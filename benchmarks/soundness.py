@@ -13,6 +13,7 @@ import multiprocessing
 import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import partial
 from time import perf_counter, process_time
 
@@ -22,6 +23,7 @@ from rich.progress import track
 from benchmarks._observers import OBSERVERS, arguments, console, table
 from polytopes import HPolytope, UndecidedError
 from svo import UncertainModel
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from tests.svo.observers.random_plants import random_plant
 
@@ -41,8 +43,7 @@ def examine(name: str, samples: int, i: int) -> Counter[str]:
     count: Counter[str] = Counter(plants=1, uncertain=int(bool(model.uncertainties)), shared=int(model.F is not None))
     begun = process_time()
     try:
-        for k in range(len(log)):
-            step = observer.update(y[k], log.u[k]) if k == 0 else observer.step(log.u[k - 1], y[k], log.u[k])
+        for k, step in enumerate(drive(observer, replace(log, y=y))):
             count["samples"] += 1
             count[step.verdict] += 1
             if step.verdict == "undecided":

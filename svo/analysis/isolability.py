@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import signature
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from polytopes import HPolytope
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.checks import Array
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers.base import Observer
@@ -196,14 +198,9 @@ def stated_faults(plant: Plant, noise: str, size: float) -> Mapping[str, StatedF
 
 def _predicted(name: str, observer: Observer, log: Log, first: int) -> HPolytope:
     """What an observer knows of the state at a sample from the data before it."""
-    missing = np.full(log.y.shape[1], np.nan)
-    for k in range(first + 1):
-        y = log.y[k] if k < first else missing
-        schedule = log.schedule_at(k)
-        if k == 0:
-            step = observer.update(y, u=log.u[0], schedule=schedule)
-        else:
-            step = observer.step(log.u[k - 1], y, u_next=log.u[k], schedule=schedule)
+    y = log.y.copy()
+    y[first] = np.nan
+    *_, step = islice(drive(observer, replace(log, y=y)), first + 1)
     lower, upper = step.box
     if np.isnan(lower).any():
         raise ValueError(f"the fault-free flight falsifies the observer {name!r}; widen its bounds (svo calibrate)")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,13 @@ from numpy.typing import NDArray
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
 from svo.isolation.alarm_kinds import model_data
 from svo.isolation.alarms import Alarm, write_alarms
-from svo.isolation.bank import Bank
-from svo.isolation.record import BankRecord, Recorder, Verdict
+from svo.isolation.record import BankRecord, Recorder
 from svo.logs.columns import check_times
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.digest import model_digest
 from svo.observers.base import Observer
-from svo.plant import MonitoredPlant, Scheduler, architecture_of, schedule_of
+from svo.plant import MonitoredPlant, architecture_of, schedule_of
 from svo.store import write_text, write_whole
 
 
@@ -93,20 +94,6 @@ class Detection:
         return tuple(name for name, alive in zip(self.record.names, self.record.alive[sample], strict=True) if alive)
 
 
-def verdicts(bank: Bank, log: Log, scheduler: Scheduler | None = None) -> Iterator[Verdict]:
-    """The bank's verdict at each sample of a log.
-
-    Without a ``scheduler`` the schedule is the log's own. Sets and boxes of a verdict's steps must be read before
-    the next verdict is asked for.
-    """
-    for k in range(len(log)):
-        schedule = log.schedule_at(k) if scheduler is None else schedule_of(scheduler, log.y[k], log.u[k])
-        if k == 0:
-            yield bank.update(log.y[0], u=log.u[0], schedule=schedule)
-        else:
-            yield bank.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=schedule)
-
-
 def check_log(plant: MonitoredPlant, log: Log) -> None:
     """Raise an error if a log is not one of a plant: its channels, and its sampling time within 1 %."""
     if isinstance(plant, str | Path):
@@ -154,7 +141,7 @@ def detect(
     bank = plant.bank(noise)
     bank.warm_up()  # no sample waits for a compiler
     recorder = Recorder(bank.names, len(log))
-    for verdict in verdicts(bank, log, plant.scheduler()):
+    for verdict in drive(bank, log, scheduler=partial(schedule_of, plant.scheduler())):
         recorder.add(verdict)
         if progress is not None:
             progress(verdict.sample + 1, len(log))

@@ -8,12 +8,13 @@ from time import perf_counter
 
 import numpy as np
 
-from svo.detection.detect import digest_of_alarm, verdicts
+from svo.detection.detect import digest_of_alarm
 from svo.isolation.alarm_kinds import model_data
 from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms
 from svo.isolation.architectures import ArchitectureII
 from svo.isolation.bank import Bank
 from svo.isolation.logic import GLOBAL
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.digest import ModelSample
 from svo.observers.window.chain import ProvingObserver
@@ -127,7 +128,7 @@ def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
 def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None]:
     """Sample at which the observer last started, and at which its model was declared falsified."""
     started, ran = 0, False
-    for verdict in verdicts(bank, log):
+    for verdict in drive(bank, log):
         step = verdict.steps.get(name)
         if step is not None and not ran:
             started = verdict.sample

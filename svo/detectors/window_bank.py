@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from svo.checks import Array
 from svo.detectors.detector import NOBODY, Detection, Kind, Parameter, Setting
 from svo.detectors.scaled_bounds import scaled_bounds
 from svo.isolation.architectures import ArchitectureI
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers.window.observer import WindowObserver
@@ -144,8 +145,6 @@ class WindowBank:
             width[k] = step.support(np.concatenate([directions, -directions])).reshape(2, -1).sum(axis=0)
 
 
-def _drive(observer: Any, log: Log) -> Any:
-    """Steps of an observer, or verdicts of a bank, over a log, one at a time; their models are those along the log."""
-    yield observer.update(log.y[0], u=log.u[0], schedule=0.0)
-    for k in range(1, len(log)):
-        yield observer.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=float(k))
+def _drive(driven: Any, log: Log) -> Iterator[Any]:
+    """The answers over a log of what is driven along it: the schedule of sample k is the number k."""
+    return drive(driven, replace(log, schedule=np.arange(len(log), dtype=float)))

@@ -19,6 +19,7 @@ from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import BankState, Sample, restored, saved
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Recorder, Verdict
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.base import Observer, Step
 
@@ -222,9 +223,8 @@ class Bank(ABC):
         """
         self._check_log(log)
         recorder = Recorder(self.names, len(log))
-        recorder.add(self.update(log.y[0], u=log.u[0], schedule=log.schedule_at(0)))
-        for k in range(1, len(log)):
-            recorder.add(self.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=log.schedule_at(k)))
+        for verdict in drive(self, log):
+            recorder.add(verdict)
         return recorder.record()
 
     # -- what the architectures add ----------------------------------------------------------------
@@ -362,8 +362,6 @@ class Bank(ABC):
         if self._sample is not None:
             raise ValueError("run was called on a bank that has already started; call reset(set), or use a fresh bank")
         model = self.observers[NOMINAL].model
-        if len(log) == 0:
-            raise ValueError("log has no samples; expected at least one")
         for name, wanted in (("u", model.n_inputs), ("y", model.n_outputs)):
             shape = getattr(log, name).shape
             if shape[1] != wanted:

@@ -1,18 +1,16 @@
-"""What a user hands to an observer: checks of a sample's data, and the samples of a log.
+"""What a user hands to an observer: checks of a sample's data.
 
 The window observer looks at shapes here and at the numbers in its kernel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from svo.checks import Array, finite_array, floats, real_number
-from svo.logs.log import Log
 from svo.models.model import UncertainModel
 
 
@@ -87,18 +85,3 @@ def stack_at(model: UncertainModel, schedule: Any) -> Array:
 def directions_of(directions: ArrayLike, n: int) -> Array:
     """Directions (k, n) of a support."""
     return finite_array("directions", directions, ("k", n))
-
-
-def steps_of(observer: Any, log: Log, needs_next_input: bool) -> Iterator[Any]:
-    """The answers of an observer that has not started, at one sample of a log after the other."""
-    if not isinstance(log, Log):
-        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log")
-    if len(log) == 0:
-        raise ValueError("log has no samples; expected at least one")
-    for k in range(len(log)):
-        following = log.u[k] if needs_next_input else None
-        schedule = log.schedule_at(k)
-        if k == 0:
-            yield observer.update(log.y[k], following, schedule)
-        else:
-            yield observer.step(log.u[k - 1], log.y[k], following, schedule)

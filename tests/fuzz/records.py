@@ -8,6 +8,7 @@ import json
 import shutil
 import tempfile
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from svo.detection.detect import detect
 from svo.detection.verification import PlantModels
 from svo.isolation.alarms import Alarm, read_alarms, verify_alarms, write_alarms
 from svo.isolation.bank import Bank
+from svo.logs.drive import drive
 from svo.logs.file import read_log
 from svo.logs.log import Log
 from svo.plant.description import read_description
@@ -115,11 +117,8 @@ def _bank_state() -> tuple[Log, int, dict[str, Any], list[Any]]:
 
 
 def _drive(bank: Bank, log: Log, start: int, stop: int) -> list[Any]:
-    said = []
-    for k in range(start, stop):
-        v = bank.update(log.y[0], u=log.u[0]) if k == 0 else bank.step(log.u[k - 1], log.y[k], u_next=log.u[k])
-        said.append((v.sample, v.state, v.alive, [v.steps[name].box[0].tobytes() for name in v.alive]))
-    return said
+    verdicts = islice(drive(bank, log, start=start), stop - start)
+    return [(v.sample, v.state, v.alive, [v.steps[name].box[0].tobytes() for name in v.alive]) for v in verdicts]
 
 
 def state(rng: np.random.Generator, folder: Path) -> None:

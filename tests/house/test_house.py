@@ -63,3 +63,11 @@ def exported(package: str) -> set[str]:
         if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__":
             return set(ast.literal_eval(node.value))
     return set()
+
+
+@pytest.mark.parametrize("module", sorted(modules()))
+def test_one_loop_goes_over_a_log(module: str) -> None:
+    """Only `svo.logs.drive` hands the input of the sample before to a step."""
+    calls = [node for node in ast.walk(tree_of(modules()[module])) if isinstance(node, ast.Call) and node.args]
+    steps = [node for node in calls if isinstance(node.func, ast.Attribute) and node.func.attr == "step"]
+    assert not [ast.unparse(node) for node in steps if ast.unparse(node.args[0]).endswith("[k - 1]")]

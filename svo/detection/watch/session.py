@@ -20,6 +20,7 @@ from svo.detection.watch.timeline import Event, Row, Timeline
 from svo.isolation.alarms import Alarm
 from svo.isolation.logic import GLOBAL
 from svo.isolation.record import Verdict
+from svo.logs.drive import advance
 from svo.plant import MonitoredPlant, resume_schedule, saved_schedule, schedule_of
 from svo.plant.description import description_digest
 
@@ -268,10 +269,7 @@ class Session:
     def _sample(self, time: float, u: Array, y: Array, missing: bool) -> list[Alarm]:
         begun = perf_counter()
         schedule = schedule_of(self._scheduler, y, u)
-        if self._held is None:
-            verdict = self._bank.update(y, u=u, schedule=schedule)
-        else:
-            verdict = self._bank.step(self._held, y, u_next=u, schedule=schedule)
+        verdict = advance(self._bank, self._held, y, u, schedule)
         self._held, self._time, self._verdict = u, time, verdict
         self._samples += 1
         self.counts.missing += missing

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope, warm_up
 from svo.checks import Array, is_count, is_finite_number
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm, set_in
 from svo.models.stack import may_be_nonzero
-from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at, steps_of
+from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at
 from svo.observers.polytope.limits import readable, within_physical
 from svo.observers.polytope.restart import RestartingPolytope
 from svo.observers.polytope.sets import PublishedRecursion, Sample, SoundRecursion
@@ -234,7 +235,7 @@ class PolytopeObserver(RestartingPolytope):
 
     def run(self, log: Log) -> PolytopeRecord:
         """All samples of a log, with the box of the state at each."""
-        steps = list(steps_of(self, log, self.model.uses_input_in_output))
+        steps = list(drive(self, log))
         boxes = np.array([step.box for step in steps])
         return PolytopeRecord(
             verdicts=tuple(step.verdict for step in steps),

@@ -16,6 +16,7 @@ from typing import Any
 from flint import fmpq
 
 from svo.checks import Array
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers import window_kernel as kernel
 from svo.observers.base import VerdictName
@@ -103,12 +104,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
             )
     again = ProvingObserver.like(observer)
     at = None
-    for k in range(len(log)):
-        schedule = log.schedule_at(k)
-        if k == 0:
-            step = again.update(log.y[0], log.u[0], schedule)
-        else:
-            step = again.step(log.u[k - 1], log.y[k], log.u[k], schedule)
+    for k, step in enumerate(drive(again, log)):
         for measurement in waiting:
             if measurement.arrived == k and step.verdict != "falsified":
                 step = again.late_update(measurement.y, measurement.taken)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
 from svo.checks import Array, is_count, is_finite_number
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm
@@ -23,7 +24,6 @@ from svo.observers.data import (
     inputs_shaped,
     outputs_shaped,
     seconds_allowed,
-    steps_of,
 )
 from svo.observers.given_units import arrival_in
 from svo.observers.saved_state import check_model, check_unchanged, last_schedule, sealed, take_exactly
@@ -278,7 +278,7 @@ class WindowObserver(RestartingWindow):
     def run(self, log: Log) -> WindowRecord:
         """All samples of a log, with the box of the state at each."""
         steps, boxes = [], []
-        for step in steps_of(self, log, self._wants_next_input):
+        for step in drive(self, log):
             steps.append(step)
             boxes.append(step.box)  # it is that of the newest sample only
         bounds = np.array(boxes)

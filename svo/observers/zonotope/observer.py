@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
 from svo.checks import Array, is_count, is_finite_number
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm
 from svo.observers.base import VerdictName
-from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at, steps_of
+from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
@@ -183,7 +184,7 @@ class ConstrainedZonotopeObserver:
 
     def run(self, log: Log) -> ZonotopeRecord:
         """All samples of a log, with the box of the state at each."""
-        steps = list(steps_of(self, log, self._wants_next_input))
+        steps = list(drive(self, log))
         boxes = np.array([step.box for step in steps])
         return ZonotopeRecord(
             verdicts=tuple(step.verdict for step in steps),

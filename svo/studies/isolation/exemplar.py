@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.checks import Array
-from svo.detection.detect import verdicts
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.base import Step
 from svo.plant import Plant, fault_start
@@ -163,7 +163,7 @@ def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
     sets: dict[str, HPolytope] = {}
     living: tuple[str, ...] = names
     begins = fault_start(plant, job.fault, job.profile)
-    for k, verdict in enumerate(verdicts(bank, log)):
+    for k, verdict in enumerate(drive(bank, log)):
         fallen = [name for name in living if name not in verdict.alive]
         if fallen and sets:
             snapshots.append(Snapshot(k - 1, f"{', '.join(fallen)} falsified next", sets))

@@ -8,8 +8,8 @@ from aircraft.eclipse.scenarios import Scenarios
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
-from svo.detection.detect import verdicts
 from svo.isolation.architectures import ArchitectureII
+from svo.logs.drive import drive
 from svo.plant import Plant, architecture_of, in_architecture, load_plant
 
 PLANT = eclipse()
@@ -118,7 +118,7 @@ def test_the_bank_of_the_other_architecture_starts_its_fault_observers_at_the_de
     assert (architecture_of(PLANT), architecture_of(plant)) == ("I", "II")
     log = plant.simulate("elevator", "step", "quiet", 3)
     bank = plant.bank("quiet")
-    states = [v.state for v in verdicts(bank, log)]
+    states = [v.state for v in drive(bank, log)]
     record = plant.bank("quiet").run(log)
     assert isinstance(bank, ArchitectureII)
     assert record.fault == "elevator"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
 from aircraft.elevator.plant import POLES, TABLE_1, elevator
 from svo import WindowObserver
 from svo.detectors.detector import Detector, Setting
+from svo.logs.drive import drive
 from svo.plant import ComparesDetectors, InputScheduler, Plant, TimesFaults, fault_start, load_plant, schedule_of
 from svo.studies.thresholds import LearnsDetectors
 
@@ -75,9 +78,7 @@ def test_the_observer_of_the_same_plant_is_inside_the_prediction_and_keeps_the_p
     p = PLANT.predictor(float(log.u[0, 0])).predict(log)
     nominal = PLANT.bank(QUIET).observers["nominal"]
     assert isinstance(nominal, WindowObserver)
-    for k in range(1_600):
-        y, schedule = log.y[k], log.schedule_at(k)
-        step = nominal.update(y, schedule=schedule) if k == 0 else nominal.step(log.u[k - 1], y, schedule=schedule)
+    for k, step in enumerate(islice(drive(nominal, log), 1_600)):
         assert step.verdict == "consistent"
         if k > 100:  # the prediction starts from 2 mrad, the observer from the whole travel
             lower, upper = (float(b[0]) for b in step.box)

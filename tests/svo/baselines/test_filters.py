@@ -13,6 +13,7 @@ from svo.baselines import (
     unknown_input_exists,
 )
 from svo.baselines.filter_kernel import filter_samples
+from svo.logs.drive import drive
 
 BOX = HPolytope.box([-1.0, -1.0, -0.5], [1.0, 2.0, 0.5])
 A = np.array([[0.9, 0.2, 0.0], [-0.1, 0.8, 0.3], [0.0, 0.1, 0.7]])
@@ -127,10 +128,7 @@ def test_online_steps_give_the_batch_innovations(log, inputs, missing):
             filter_.run(log)
         return
     batch, online = filter_.run(log), filter_.start()
-    steps = [online.update(log.y[0], u=log.u[0], schedule=log.schedule_at(0))]
-    for k in range(1, len(log)):
-        steps.append(online.step(log.u[k - 1], log.y[k], u_next=log.u[k], schedule=log.schedule_at(k)))
-    np.testing.assert_allclose(batch.white, steps, atol=1e-12)
+    np.testing.assert_allclose(batch.white, list(drive(online, log)), atol=1e-12)
 
 
 def test_whitened_innovations_are_standard_gaussians():

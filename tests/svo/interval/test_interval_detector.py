@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import islice
 from typing import get_args
 
 import numpy as np
@@ -16,6 +17,7 @@ from svo.interval import (
     NoiseCharacterization,
     ThresholdVerdict,
 )
+from svo.logs.drive import drive
 from svo.observers.base import VerdictName
 
 BOUNDS = GainBounds(0.8, 0.05)
@@ -44,7 +46,7 @@ def test_samples_one_by_one_are_the_run_over_the_log(pole: float) -> None:
     log.y[[0, 3, 4, 120, 299]] = np.nan
     online = detector(pole)
     record = online.run(log)
-    steps = [online.update(log.y[0])] + [online.step(log.u[k - 1], log.y[k]) for k in range(1, 300)]
+    steps = list(drive(online, log))
     assert [s.sample for s in steps] == list(range(300))
     assert tuple(s.verdict for s in steps) == record.verdicts
     assert np.array([s.interval for s in steps]) == pytest.approx(
@@ -90,7 +92,7 @@ def test_an_alarm_is_of_another_kind_than_a_falsification() -> None:
     assert set(get_args(VerdictName)) & {"exceeded"} == set()
     online, log = detector(), plant_log(800, seed=5, jam_at=600)
     online.update(log.y[0])
-    steps = [online.step(log.u[k - 1], log.y[k]) for k in range(1, 800)]
+    steps = list(islice(drive(online, log, start=1), 799))
     alarm = next(s for s in steps if s.exceeded)
     assert alarm.verdict == "exceeded"
     assert not hasattr(alarm, "certificate")
@@ -100,9 +102,9 @@ def test_an_alarm_is_of_another_kind_than_a_falsification() -> None:
 
 def test_a_reset_starts_again_from_another_interval() -> None:
     online, log = detector(), plant_log(100, seed=2)
-    first = [online.update(log.y[0])] + [online.step(log.u[k - 1], log.y[k]) for k in range(1, 100)]
+    first = list(islice(drive(online, log), 100))
     online.reset(0.0, 0.01)
-    again = [online.update(log.y[0])] + [online.step(log.u[k - 1], log.y[k]) for k in range(1, 100)]
+    again = list(islice(drive(online, log), 100))
     assert [(s.sample, s.filtered, s.threshold) for s in first] == [(s.sample, s.filtered, s.threshold) for s in again]
     online.reset(0.5, 0.2)
     assert online.update(0.9).residual == pytest.approx(0.2)

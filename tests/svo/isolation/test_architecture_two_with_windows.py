@@ -14,6 +14,7 @@ from small_plant import SAMPLES, START, faults_of, fly, plant
 from polytopes import HPolytope
 from svo.faults import ActuatorFault, Intermittent, SensorFault, Step
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers.window.observer import WindowObserver
@@ -91,8 +92,7 @@ def test_the_global_set_contains_the_state_whatever_the_fault() -> None:
     nominal = plant(rng)
     log = fly(nominal, faults(Step(START))["hard-over"], X0, rng)
     b = bank(nominal)
-    for k in range(SAMPLES):
-        verdict = b.update(log.y[0], u=log.u[0]) if k == 0 else b.step(log.u[k - 1], log.y[k], u_next=log.u[k])
+    for k, verdict in enumerate(drive(b, log)):
         for name in {"global", "hard-over"} & set(verdict.steps):
             lower, upper = verdict.steps[name].box
             assert (lower - 1e-9 <= log.x[k]).all()
@@ -114,8 +114,7 @@ def test_exactly_one_outlier_is_debounced(size: float, without: str) -> None:
     log = with_outlier(nominal, size)
     assert bank(nominal).run(log).states[15] == without
     b = bank(nominal, debounce=2)
-    for k in range(SAMPLES):
-        verdict = b.update(log.y[0], u=log.u[0]) if k == 0 else b.step(log.u[k - 1], log.y[k], u_next=log.u[k])
+    for k, verdict in enumerate(drive(b, log)):
         assert (verdict.state, verdict.alive) == ("nominal", b.names)
         assert (verdict.steps["nominal"].verdict == "falsified") == (k == 15)
         if k != 15:

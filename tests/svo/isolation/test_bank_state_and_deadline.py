@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from itertools import islice
 from time import perf_counter
 from typing import Any
 
@@ -15,6 +16,7 @@ from svo import ArchitectureI, ArchitectureII, WindowObserver
 from svo.faults import ActuatorFault, FaultPair, Intermittent, SensorFault, Step, pairs
 from svo.isolation.bank import Bank
 from svo.isolation.record import Verdict
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from tests.svo.isolation.fake_observers import FakeObserver
 from tests.svo.isolation.small_plant import START, TS, faults_of, fly, plant
@@ -45,16 +47,9 @@ def second_bank(profile: Any, **options: Any) -> Bank:
     )
 
 
-def drive(bank: Bank, log: Log, start: int, stop: int, deadline: float | None = None) -> list[Any]:
+def driven(bank: Bank, log: Log, start: int, stop: int, deadline: float | None = None) -> list[Any]:
     """Conclusions and boxes of each sample."""
-    found = []
-    for k in range(start, stop):
-        if k == 0:
-            verdict = bank.update(log.y[0], u=log.u[0])
-        else:
-            verdict = bank.step(log.u[k - 1], log.y[k], u_next=log.u[k], deadline=deadline)
-        found.append(what(verdict))
-    return found
+    return [what(verdict) for verdict in islice(drive(bank, log, start=start, deadline=deadline), stop - start)]
 
 
 def what(v: Verdict) -> Any:
@@ -72,19 +67,19 @@ def test_a_saved_bank_goes_on_bit_for_bit(build: Callable[..., Bank], options: d
     nominal, faults = models(profile)
     log = fly(nominal, faults["bias"], np.zeros(2), np.random.default_rng(5))
     log.y[13] += 50.0  # an outlier that nothing explains
-    whole = drive(build(profile, **options), log, 0, len(log))
+    whole = driven(build(profile, **options), log, 0, len(log))
     states = {entry[1] for entry in whole}
     assert "detected" in states or "isolated" in states
     for cut in (1, 9, 11, 12, 13, 14, 15, 20, 33):
         bank = build(profile, **options)
-        drive(bank, log, 0, cut)
+        driven(bank, log, 0, cut)
         file = io.BytesIO()
         np.savez(file, **bank.state_dict())
         file.seek(0)
         again = build(profile, **options)
         with np.load(file, allow_pickle=False) as state:
             again.load_state_dict(state)
-        assert drive(again, log, cut, len(log)) == whole[cut:]
+        assert driven(again, log, cut, len(log)) == whole[cut:]
 
 
 def test_a_bank_that_has_not_started_can_be_saved() -> None:
@@ -148,7 +143,7 @@ def test_a_long_deadline_changes_nothing_but_the_portions_of_the_programs() -> N
     profile = Step(START)
     nominal, faults = models(profile)
     log = fly(nominal, faults["loss"], np.zeros(2), np.random.default_rng(1))
-    free, timed = (drive(first_bank(profile), log, 0, len(log), deadline) for deadline in (None, 60.0))
+    free, timed = (driven(first_bank(profile), log, 0, len(log), deadline) for deadline in (None, 60.0))
     assert [entry[:6] for entry in free] == [entry[:6] for entry in timed]
 
 

@@ -15,6 +15,7 @@ from svo import ArchitectureI, ArchitectureII, ConstrainedZonotopeObserver, Wind
 from svo.faults import Ramp, Step
 from svo.isolation.bank import Bank
 from svo.isolation.record import Verdict
+from svo.logs.drive import advance
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 
@@ -38,7 +39,7 @@ def bank_two(nominal: UncertainModel, faults: dict[str, Any], **options: Any) ->
 def take(bank: Bank, log: Log, k: int, late: bool) -> Verdict:
     """Sample k; with ``late``, its second sensor comes after DELAY more samples."""
     y = np.where([False, late], np.nan, log.y[k])
-    verdict = bank.update(y, u=log.u[0]) if k == 0 else bank.step(log.u[k - 1], y, u_next=log.u[k])
+    verdict = advance(bank, log.u[k - 1] if k else None, y, log.u[k], None)
     taken = k - DELAY
     if late and taken >= 0:
         verdict = bank.late_update([np.nan, log.y[taken, 1]], taken)
@@ -97,7 +98,7 @@ def test_late_data_alone_detect_and_isolate_at_the_newest_sample() -> None:
     bank = bank_one(nominal, chosen)
     for k in range(len(log)):
         y = np.where([False, k >= 10], np.nan, log.y[k])
-        verdict = bank.update(y, u=log.u[0]) if k == 0 else bank.step(log.u[k - 1], y, u_next=log.u[k])
+        verdict = advance(bank, log.u[k - 1] if k else None, y, log.u[k], None)
     assert verdict.state == "nominal"
     for k in range(12, 16):
         verdict = bank.late_update([np.nan, log.y[k, 1]], k)

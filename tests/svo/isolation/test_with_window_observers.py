@@ -14,6 +14,7 @@ from small_plant import SAMPLES, START, TS, faults_of, fly, plant
 from polytopes import HPolytope
 from svo.faults import Intermittent, Ramp, Step
 from svo.isolation.architectures import ArchitectureI
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers.window.observer import WindowObserver
@@ -81,8 +82,7 @@ def test_one_outlier_is_an_alarm_without_debounce() -> None:
 def test_one_outlier_is_forgiven_with_debounce(options: dict[str, int]) -> None:
     nominal, faults, log = outlier_case()
     b = bank(nominal, faults, np.zeros(2), **options)
-    for k in range(SAMPLES):
-        verdict = b.update(log.y[0]) if k == 0 else b.step(log.u[k - 1], log.y[k])
+    for k, verdict in enumerate(drive(b, log)):
         assert verdict.state == "nominal"
         falsified = {name for name, step in verdict.steps.items() if step.verdict == "falsified"}
         assert falsified == (set(b.names) if k == 15 else set())

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from polytopes.exact import rational
 from svo import UncertainModel, WindowObserver
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.window_kernel import rounding
 from tests.svo.observers.random_plants import random_plant
@@ -38,8 +39,7 @@ def boxes_of(model: UncertainModel, log: Log, horizon: int | None, every: int) -
     """Boxes before any program was stopped."""
     initial = HPolytope.box(-np.ones(model.n_states), np.ones(model.n_states))
     observer, boxes = WindowObserver(model, initial, horizon), {}
-    for k in range(len(log)):
-        step = observer.update(log.y[k], log.u[k]) if k == 0 else observer.step(log.u[k - 1], log.y[k], log.u[k])
+    for k, step in enumerate(drive(observer, log)):
         assert step.verdict == "consistent"
         if k % every == every - 1:
             box = step.box

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
+from svo.logs.drive import drive
 from svo.models.normal_form import NormalForm
 from svo.observers.polytope.observer import PolytopeObserver
 from svo.observers.window.evidence import WindowCertificate, WindowSample
@@ -69,15 +70,7 @@ def compare(make: Any, units: Units, model: UncertainModel, start: HPolytope, lo
     """Both observers along the log; returns the certificates."""
     one, two = make(model, start, 0), make(units.model(model), units.set("x", start), units.x)
     other = units.log(log)
-    for k in range(len(log)):
-        answers = []
-        for observer, data in ((one, log), (two, other)):
-            now = data.schedule_at(k)
-            if k == 0:
-                answers.append(observer.update(data.y[0], data.u[0], now))
-            else:
-                answers.append(observer.step(data.u[k - 1], data.y[k], data.u[k], now))
-        a, b = answers
+    for k, (a, b) in enumerate(zip(drive(one, log), drive(two, other), strict=True)):
         assert a.verdict == b.verdict, k
         for end, scaled in zip(a.box, b.box, strict=True):
             assert same(np.ldexp(end, units.x), scaled), k

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.window import observer as window_module
 from svo.observers.window.chain import prove_chain
@@ -84,8 +86,7 @@ def test_all_data_give_the_exact_box(seed: int) -> None:
     assert can_inject(model)
     observer = observer_of(model, log, None, eps=1e-13)
     lower, upper = log.x[0] - 0.4, log.x[0] + 0.6  # type: ignore[index]
-    for k in range(len(log)):
-        step = observer.update(log.y[0], log.u[0]) if k == 0 else observer.step(log.u[k - 1], log.y[k], log.u[k])
+    for k, step in enumerate(drive(observer, log)):
         assert step.verdict == "consistent"
         inner = oracle.box(model, oracle.prefix(log, k + 1), lower, upper, [()], rounding=0.0)
         wider = oracle.box(model, oracle.prefix(log, k + 1), lower, upper, [()], rounding=1e-7)
@@ -101,8 +102,7 @@ def test_all_data_give_the_exact_box(seed: int) -> None:
 def test_truth_stays_inside(seed: int) -> None:
     model, log = random_run(seed, 30)
     observer = observer_of(model, log, 1 + seed % 8)
-    for k in range(len(log)):
-        step = observer.update(log.y[0], log.u[0]) if k == 0 else observer.step(log.u[k - 1], log.y[k], log.u[k])
+    for k, step in enumerate(drive(observer, log)):
         assert step.verdict == "consistent", k
         assert log.x is not None
         room = 1e-12 * (1.0 + np.abs(log.x[k]))
@@ -167,8 +167,7 @@ def test_a_saved_state_continues_bit_for_bit() -> None:
     model, log = random_run(3, 24)
     whole, half = observer_of(model, log, 3), observer_of(model, log, 3)
     for observer, stop in ((whole, 24), (half, 12)):
-        for k in range(stop):
-            step = observer.update(log.y[0], log.u[0]) if k == 0 else observer.step(log.u[k - 1], log.y[k], log.u[k])
+        for k, step in enumerate(islice(drive(observer, log), stop)):
             if k < 12:
                 _ = step.box
     file = io.BytesIO()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from polytopes import HPolytope, convex_hull
 from svo import ArchitectureI, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
 from svo.faults import SensorFault, Step
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.polytope import vertex_images
 from svo.observers.polytope.vertex_images import FacetLimitError, hull_of_images, transitions
@@ -36,8 +38,7 @@ def random_run(seed: int, samples: int) -> tuple[np.random.Generator, UncertainM
 
 
 def check_containment(observer: PolytopeObserver, log: Log, y: np.ndarray) -> None:
-    for k in range(len(log)):
-        step = observer.update(y[k], log.u[k]) if k == 0 else observer.step(log.u[k - 1], y[k], log.u[k])
+    for k, step in enumerate(drive(observer, replace(log, y=y))):
         assert step.verdict == "consistent", (k, step.verdict)
         assert log.x is not None
         room = 1e-12 * (1.0 + np.abs(log.x[k]).max())
@@ -142,11 +143,7 @@ def test_without_uncertainty_it_is_the_full_information_window(seed: int, shared
     polytope = PolytopeObserver(model, initial, max_facets=None, eps=0.0)
     observers = (polytope, WindowObserver(model, initial, horizon=None, eps=0.0))
     directions = rng.normal(size=(12, n))
-    for k in range(5):
-        steps = [
-            o.update(log.y[0], schedule=schedule[0]) if k == 0 else o.step(log.u[k - 1], log.y[k], schedule=schedule[k])
-            for o in observers
-        ]
+    for steps in zip(*(drive(observer, log) for observer in observers), strict=True):
         expected = steps[1].support(directions)
         scale = np.abs(directions).sum(axis=1) * np.abs(steps[1].box).max()
         assert np.abs(steps[0].set.support(directions) - expected).max() <= 1e-9 * scale.max()

@@ -10,6 +10,7 @@ import pytest
 
 from polytopes import HPolytope
 from svo import ConstrainedZonotopeObserver, Log, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
+from svo.logs import drive
 
 OBSERVERS = [WindowObserver, PolytopeObserver, ConstrainedZonotopeObserver]
 BOX = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
@@ -31,7 +32,7 @@ def flight(model: UncertainModel, samples: int = 12) -> Log:
 
 def advance(observer: Any, log: Log, k: int, y: Any = None) -> Any:
     y = log.y[k] if y is None else y
-    return observer.update(y, log.u[k]) if k == 0 else observer.step(log.u[k - 1], y, log.u[k])
+    return drive.advance(observer, log.u[k - 1] if k else None, y, log.u[k], None)
 
 
 @every_observer

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver, calibrate, distinguishability
+from svo.logs.drive import drive
 from svo.observers.window.left_out import factors_of
 from svo.observers.window_kernel import channel_count, channel_factors
 from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
@@ -67,12 +69,11 @@ def test_a_log_that_is_cut_anywhere_goes_on_bit_for_bit(make: Any) -> None:
     whole = make(model, start).run(log)
     for cut in (1, 5, 8):
         observer = make(model, start)
-        for k in range(cut):
-            step = observer.update(log.y[0], log.u[0]) if k == 0 else observer.step(log.u[k - 1], log.y[k], log.u[k])
+        for step in islice(drive(observer, log), cut):
             _ = step.box  # reading it leaves a basis behind
         again = make.from_state_dict(model, observer.state_dict())
-        for k in range(cut, len(log)):
-            lower, upper = again.step(log.u[k - 1], log.y[k], log.u[k]).box
+        for k, step in enumerate(drive(again, log, start=cut), cut):
+            lower, upper = step.box
             assert same(lower, whole.lower[k])
             assert same(upper, whole.upper[k])
 
@@ -87,8 +88,7 @@ def test_units_change_nothing_of_a_bank() -> None:
     for m, P, data in ((model, start, logs[0]), (units.model(model), units.set("x", start), logs[1])):
         faulty = m.replace(n=m.bounds()[2] * np.array([400.0, 1.0]))
         bank = ArchitectureI(nominal=WindowObserver(m, P), faults={"gauge": WindowObserver(faulty, P)})
-        verdicts = [bank.update(data.y[0])]
-        verdicts += [bank.step(data.u[k - 1], data.y[k]) for k in range(1, len(data))]
+        verdicts = drive(bank, data)
         answers.append([(v.state, v.fault, v.alive, v.detected_at, v.isolated_at) for v in verdicts])
     assert answers[0] == answers[1]
     assert answers[0][-1][0] == "isolated"

@@ -16,6 +16,7 @@ from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver
 from svo.detection.detect import alarms_of
 from svo.detection.verification import verify_chains
 from svo.isolation.alarms import Alarm, verify_alarms, write_alarms
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.window.sign_split import SplitCertificate
 from tests.svo.observers import oracle
@@ -72,8 +73,7 @@ def test_truth_stays_inside_with_any_number_of_cells(seed: int) -> None:
     x0 = rng.uniform(-1.0, 1.0, model.n_states)
     log = model.simulate(x0, rng.normal(size=(10, model.n_inputs)), rng, corners=bool(rng.random() < 0.5))
     observer = WindowObserver(model, HPolytope.box(x0 - 1.0, x0 + 1.0), 3, sign_split=int(rng.integers(1, 12)))
-    for k in range(len(log)):
-        step = observer.update(log.y[0], log.u[0]) if k == 0 else observer.step(log.u[k - 1], log.y[k], log.u[k])
+    for k, step in enumerate(drive(observer, log)):
         assert step.verdict == "consistent"
         assert log.x is not None
         lower, upper = step.box

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.linalg import solve_discrete_are
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from tests.svo.observers.random_plants import random_plant
 
@@ -28,8 +30,7 @@ def random_initial(rng: np.random.Generator, x0: np.ndarray) -> HPolytope:
 
 
 def check_containment(observer: WindowObserver, log: Log, y: np.ndarray) -> None:
-    for k in range(len(log)):
-        step = observer.update(y[k], log.u[k]) if k == 0 else observer.step(log.u[k - 1], y[k], log.u[k])
+    for k, step in enumerate(drive(observer, replace(log, y=y))):
         assert step.verdict == "consistent", (k, step.verdict)
         lower, upper = step.box
         assert log.x is not None

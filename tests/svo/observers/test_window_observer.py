@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
+from itertools import islice
 from time import process_time
 from typing import Any
 
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers import window_kernel as kernel
 from tests.svo.observers.random_plants import random_plant
@@ -36,11 +38,7 @@ Answer = tuple[str, np.ndarray, np.ndarray]
 
 
 def run_all(observer: WindowObserver, log: Log, start: int = 0, **step: Any) -> list[Answer]:
-    out = []
-    for k in range(start, len(log)):
-        answer = observer.update(log.y[0]) if k == 0 else observer.step(log.u[k - 1], log.y[k], **step)
-        out.append((answer.verdict, *answer.box))
-    return out
+    return [(answer.verdict, *answer.box) for answer in drive(observer, log, start=start, **step)]
 
 
 # -- arguments -----------------------------------------------------------------------------------------------
@@ -249,8 +247,8 @@ def test_a_saved_state_continues_bit_for_bit(horizon: int | None) -> None:
     model, log = flown(60)
     whole = run_all(WindowObserver(model, BOX, horizon), log)
     observer = WindowObserver(model, BOX, horizon)
-    for k in range(25):
-        _ = (observer.update(log.y[0]) if k == 0 else observer.step(log.u[k - 1], log.y[k])).box
+    for step in islice(drive(observer, log), 25):
+        _ = step.box
     file = io.BytesIO()
     np.savez(file, **observer.state_dict())
     file.seek(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from polytopes.exact import rational, rational_vector
 from svo import ConstrainedZonotopeObserver, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
+from svo.logs.drive import drive
 from svo.observers.zonotope.program import ZonotopeProgram
 from svo.observers.zonotope.reduction import reduced, rescaled
 from svo.observers.zonotope.zonotope import ConstrainedZonotope
@@ -112,8 +114,7 @@ def test_truth_stays_inside_random_uncertain_plants(seed: int, limits: tuple[int
         y[rng.random(y.shape) < 0.3] = np.nan
     sizes = [None if value is None else value * model.n_states for value in limits]
     observer = ConstrainedZonotopeObserver(model, random_initial(rng, x0), *sizes)
-    for k in range(len(log)):
-        step = observer.update(y[k], log.u[k]) if k == 0 else observer.step(log.u[k - 1], y[k], log.u[k])
+    for k, step in enumerate(drive(observer, replace(log, y=y))):
         assert step.verdict == "consistent", k
         room = 1e-12 * (1.0 + np.abs(log.x[k]).max())
         assert (step.box[0] - room <= log.x[k]).all(), k

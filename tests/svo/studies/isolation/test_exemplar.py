@@ -13,6 +13,7 @@ import pytest
 
 from polytopes import HPolytope
 from svo import UncertainModel, WindowObserver
+from svo.logs.drive import drive
 from svo.studies.isolation.exemplar import Exemplar, Snapshot, planar_outline
 
 
@@ -22,9 +23,7 @@ def test_the_outline_holds_the_truth_and_cuts_corners_of_the_box() -> None:
     log = cart.simulate([0.1, 0.0], np.ones((30, 1)), rng, corners=True)
     observer = WindowObserver(cart, HPolytope.box([-1, -1], [1, 1]))
     assert log.x is not None
-    step = observer.update(log.y[0])
-    for k in range(1, len(log)):
-        step = observer.step(log.u[k - 1], log.y[k])
+    for k, step in enumerate(drive(observer, log)):
         outline = planar_outline(step)
         assert outline.contains(log.x[k], tol=1e-9)
     assert outline.volume() < 0.8 * step.set.volume()

@@ -1,0 +1,83 @@
+"""The one loop over a log: what is driven is updated with the first sample, then stepped from each to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol, TypeVar
+
+from svo.checks import Array
+from svo.logs.log import Log
+
+Answer_co = TypeVar("Answer_co", covariant=True)
+Answer = TypeVar("Answer")
+
+
+class Driven(Protocol[Answer_co]):
+    """What can be driven over a log: an observer, a bank, a detector or a filter."""
+
+    def update(self, y0: Any, u: Any = None, schedule: Any = None) -> Answer_co:
+        """A measurement without a transition (the first one)."""
+        ...
+
+    @property
+    def step(self) -> Callable[..., Answer_co]:
+        """Called as step(u, y, u_next=None, schedule=None): one transition driven by u, then the measurement y."""
+        ...
+
+
+def advance(driven: Driven[Answer], held: Array | None, y: Array, u: Array, schedule: Any, **options: Any) -> Answer:
+    """The answer at the next sample.
+
+    Parameters
+    ----------
+    driven : observer, bank or the like
+    held : (nu,) array or None
+        The input that drove the plant here; None at the first sample.
+    y, u : (ny,), (nu,) arrays
+        The measurement, and the input that is held from now on.
+    schedule
+        Scheduling value of the sample, or None.
+    options
+        Of ``driven.step``, such as ``deadline``.
+    """
+    if held is None:
+        return driven.update(y, u=u, schedule=schedule)
+    return driven.step(held, y, u_next=u, schedule=schedule, **options)
+
+
+def drive(
+    driven: Driven[Answer],
+    log: Log,
+    *,
+    start: int = 0,
+    scheduler: Callable[[Array, Array], Any] | None = None,
+    **options: Any,
+) -> Iterator[Answer]:
+    """The answers at one sample of a log after the other; who has seen enough stops asking.
+
+    Parameters
+    ----------
+    driven : observer, bank or the like
+        Not started, or with ``start`` samples behind it. Sets and boxes of an answer must be read before the next one
+        is asked for.
+    log : Log
+    start : int
+        First sample; above zero for what goes on from a saved state.
+    scheduler : callable, optional
+        Of y (ny,) and u (nu,) of each sample in turn; by default the schedule is the log's own.
+    options
+        Of ``driven.step``, such as ``deadline``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If ``log`` is no log or has no samples, and what ``driven`` raises.
+    """
+    if not isinstance(log, Log):
+        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.logs.file.read_log gives")
+    if len(log) == 0:
+        raise ValueError("log has no samples; expected at least one")
+    for k in range(start, len(log)):
+        held, y, u = log.u[k - 1] if k else None, log.y[k], log.u[k]
+        schedule = log.schedule_at(k) if scheduler is None else scheduler(y, u)
+        yield advance(driven, held, y, u, schedule, **options)
