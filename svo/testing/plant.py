@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.observers.data import steps_of
 from svo.plant import HEALTHY, MonitoredPlant, schedule_of
 from svo.testing.plant_runs import SEED, PlantRuns, Scenario, around, cut, misfit, nominal_model
 from svo.testing.rules import Conformance, keep, rule, table
@@ -195,7 +195,7 @@ def stated_disturbances(runs: PlantRuns) -> Iterator[str]:
 def healthy_bank(runs: PlantRuns) -> Iterator[str]:
     for scenario in runs.healthy:
         bank, log = runs.plant.bank(scenario.noise), cut(runs.log(scenario), 0, LOOKED_AT)
-        for k, verdict in enumerate(steps_of(bank, log, True)):
+        for k, verdict in enumerate(drive(bank, log)):
             dead = [name for name, step in verdict.steps.items() if step.verdict == "falsified"]
             if dead:
                 yield f"{scenario}: {', '.join(dead)} falsified at sample {k}"
@@ -228,7 +228,7 @@ def _falsified_at(runs: PlantRuns, scenario: Scenario) -> int | None:
     if log.x is None or log.x.shape[1] != observer.model.n_states:
         return bank.run(log).died_at[scenario.fault]
     observer.reset(around(log, first))
-    for k, step in enumerate(steps_of(observer, cut(log, first, first + AFTER_A_FAULT), True)):
+    for k, step in enumerate(drive(observer, cut(log, first, first + AFTER_A_FAULT))):
         if step.verdict == "falsified":
             return first + k
     return None
