@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 
-from polytopes.silent_highs import new_highs
+from polytopes.highs import HighsProgram
 from svo.checks import Array
 
 Columns = NDArray[np.int64]
@@ -72,34 +72,18 @@ class SparseProgram:
         RuntimeError
             If HiGHS cannot decide.
         """
-        import highspy  # imported here: slow to load
-
-        matrix = self._matrix()
-        program = highspy.HighsLp()
-        program.num_col_, program.num_row_ = self._column_count, self._row_count
-        program.col_cost_ = cost
-        program.col_lower_, program.col_upper_ = self._column_bounds(for_solver=True)
-        program.row_lower_, program.row_upper_ = self._row_bounds()
-        program.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
-        program.a_matrix_.start_, program.a_matrix_.index_ = matrix.indptr, matrix.indices
-        program.a_matrix_.value_ = matrix.data
-        status = None
+        (lower, upper), (row_lower, row_upper) = self._column_bounds(for_solver=True), self._row_bounds()
+        matrix, status = self._matrix(), ""
         for method, presolve in ((solver, "on"), ("simplex", "off")):  # thin programs leave one of them undecided
-            highs = new_highs()
-            options: dict[str, Any] = {"threads": 1, "small_matrix_value": 1e-12}
-            options |= {"solver": method, "presolve": presolve}
+            options = {"threads": 1, "small_matrix_value": 1e-12, "solver": method, "presolve": presolve}
             options |= {f"{side}_feasibility_tolerance": FEASIBILITY for side in ("primal", "dual")}
-            for option, value in options.items():
-                highs.setOptionValue(option, value)
-            highs.passModel(program)
-            highs.run()
-            status = highs.getModelStatus()
-            if status == highspy.HighsModelStatus.kInfeasible:
+            program = HighsProgram(matrix, row_upper, row_lower=row_lower, lower=lower, upper=upper, options=options)
+            found = program.minimise(cost)
+            status = found.status
+            if status == "infeasible":
                 return None
-            if status == highspy.HighsModelStatus.kOptimal:
-                found = highs.getSolution()
-                point = np.array(found.col_value)
-                return Solution(float(cost @ point), point, np.array(found.row_dual))
+            if status == "optimal":
+                return Solution(found.value, found.point, found.multipliers)
         raise RuntimeError(f"HiGHS left a program of {self._row_count} rows undecided ({status}); take fewer samples")
 
     def weak_dual_bound(self, cost: Array, multipliers: Array) -> float:

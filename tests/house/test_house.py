@@ -71,3 +71,14 @@ def test_one_loop_goes_over_a_log(module: str) -> None:
     calls = [node for node in ast.walk(tree_of(modules()[module])) if isinstance(node, ast.Call) and node.args]
     steps = [node for node in calls if isinstance(node.func, ast.Attribute) and node.func.attr == "step"]
     assert not [ast.unparse(node) for node in steps if ast.unparse(node.args[0]).endswith("[k - 1]")]
+
+
+def test_one_file_names_highs() -> None:
+    named = {
+        module
+        for module, path in modules().items()
+        for node in ast.walk(tree_of(path))
+        if (isinstance(node, ast.Import) and any(a.name.split(".")[0] == "highspy" for a in node.names))
+        or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "highspy")
+    }
+    assert named == {"polytopes.highs"}
