@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
-from svo.isolation.alarm_kinds import model_data
 from svo.isolation.alarms import Alarm, write_alarms
 from svo.isolation.record import BankRecord, Recorder
 from svo.logs.columns import check_times
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.digest import model_digest
-from svo.observers.base import Observer
+from svo.observers.base import Certificate, Observer
 from svo.plant import MonitoredPlant, architecture_of, schedule_of
 from svo.store import write_text, write_whole
 
@@ -164,18 +163,15 @@ def alarms_of(
     alarms = []
     for k, name in died:
         proof = record.certificates[name]
+        assert proof is not None  # banks take no falsification without one
         model = None if observers is None else digest_of_alarm(observers[name], proof)
         alarms.append(Alarm(name, k, float(log.time[k]), proof, source, model))
     return tuple(alarms)
 
 
-def digest_of_alarm(observer: Observer, certificate: Any) -> str | None:
-    """Digest of an observer's model and options with the numbers that a certificate holds of it.
-
-    None for an observer of the user's own that names no options.
-    """
-    options = getattr(observer, "options", None)
-    return None if options is None else model_digest(observer.model, options, model_data(certificate))
+def digest_of_alarm(observer: Observer, certificate: Certificate) -> str:
+    """Digest of an observer's model and options with the numbers that a certificate holds of it."""
+    return model_digest(observer.model, observer.options, certificate.model_data())
 
 
 def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:

@@ -9,7 +9,6 @@ from time import perf_counter
 import numpy as np
 
 from svo.detection.detect import digest_of_alarm
-from svo.isolation.alarm_kinds import model_data
 from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms
 from svo.isolation.architectures import ArchitectureII
 from svo.isolation.bank import Bank
@@ -54,7 +53,7 @@ class PlantModels:
         observer = self.bank(alarm).observers.get(alarm.observer)
         if observer is None:
             return f"the plant's bank has no model {alarm.observer!r:.80}"
-        claimed = model_data(alarm.certificate)
+        claimed = alarm.certificate.model_data()
         first = alarm.sample + 1 - len(claimed)
         right = [ModelSample.of(observer.model, self.log.schedule_at(first + i)) for i in range(len(claimed))]
         for k, (mine, its) in enumerate(zip(claimed, right, strict=True), start=first):

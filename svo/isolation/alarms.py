@@ -3,9 +3,8 @@
 Floats are written in hexadecimal, so that a stored proof is about exactly the numbers that the observer saw. A
 record is rejected if its SHA-256 does not match, if the proof does not hold in exact arithmetic, or, given the
 log, if its data are not those of the log. What one proof shows is conditional: a window's on its arrival set and on
-the bounds of s of its channels (see `svo.observers.window.evidence`), a polytope observer's on the set before the
+the bounds of s of its channels (see `svo.observers.window.certificate`), a polytope observer's on the set before the
 measurement.
-How the certificate of each kind of observer is stored stands in `svo.isolation.alarm_kinds`.
 """
 
 from __future__ import annotations
@@ -18,11 +17,19 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from svo.isolation.alarm_kinds import KINDS, kind_of
 from svo.logs.log import Log
+from svo.observers.certificate import Certificate
+from svo.observers.polytope.certificate import PolytopeCertificate
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.sign_split import SplitCertificate
+from svo.observers.zonotope.certificate import ZonotopeCertificate
 from svo.store.values import check_keys, decode_float, decode_integer
 
 FORMAT = "svo-alarm-2"
+KINDS: dict[str, type[Certificate]] = {
+    kind.kind: kind for kind in (WindowCertificate, SplitCertificate, ZonotopeCertificate, PolytopeCertificate)
+}
+"""The certificates that can be stored, by the name of their kind."""
 _ENTRIES = {"format", "kind", "observer", "sample", "time", "source", "certificate", "sha256"}
 
 
@@ -38,7 +45,8 @@ class Alarm:
         Sample of the log at which it was falsified.
     time : float
         Time of that sample [s].
-    certificate : WindowCertificate or another that `svo.isolation.alarm_kinds` can store
+    certificate : Certificate
+        To be stored it is of one of `KINDS`.
     source : mapping
         Where the data come from: plant, noise set, seed, file.
     model : str or None
@@ -48,7 +56,7 @@ class Alarm:
     observer: str
     sample: int
     time: float
-    certificate: Any
+    certificate: Certificate
     source: Mapping[str, str | int | float]
     model: str | None = None
 
@@ -142,20 +150,18 @@ def _check(number: int, text: str, log: Log | None, model_difference: ModelDiffe
         alarm = _decode(text)
     except _BadRecord as error:
         return AlarmCheck(number, "?", -1, False, str(error), perf_counter() - begun)
-    kind = kind_of(alarm.certificate)
-    proven = f"proven given {kind.proves(alarm.certificate, alarm.sample)}"
     compared = ", data as in the log"
     if not alarm.certificate.verify():
         wrong: str | None = "the proof does not hold"
     elif log is None:
         wrong, compared = None, " and that its model is the plant's"
     else:
-        wrong = _difference(alarm, log) or kind.difference(alarm.certificate, alarm.sample, log)
+        wrong = _difference(alarm, log) or alarm.certificate.difference(alarm.sample, log)
         if model_difference is not None:
             wrong = wrong or model_difference(alarm)
             compared += ", model as the plant's" if alarm.model else ", model not compared beyond matrices and bounds"
-    ok, seconds = wrong is None, perf_counter() - begun
-    return AlarmCheck(number, alarm.observer, alarm.sample, ok, wrong or proven + compared, seconds)
+    reason = wrong or f"proven given {alarm.certificate.premise(alarm.sample)}{compared}"
+    return AlarmCheck(number, alarm.observer, alarm.sample, wrong is None, reason, perf_counter() - begun)
 
 
 def _difference(alarm: Alarm, log: Log) -> str | None:
@@ -183,15 +189,18 @@ def alarm_line(alarm: Alarm) -> str:
 
 
 def _encode(alarm: Alarm) -> dict[str, Any]:
-    kind = kind_of(alarm.certificate)
+    certificate = alarm.certificate
+    if KINDS.get(certificate.kind) is not type(certificate):
+        own, known = type(certificate).__name__, ", ".join(kind.__name__ for kind in KINDS.values())
+        raise TypeError(f"certificate is {own}, which no alarm can store; expected one of {known}")
     return ({} if alarm.model is None else {"model": alarm.model}) | {
         "format": FORMAT,
-        "kind": kind.name,
+        "kind": certificate.kind,
         "observer": alarm.observer,
         "sample": int(alarm.sample),
         "time": float(alarm.time).hex(),
         "source": dict(alarm.source),
-        "certificate": kind.encode(alarm.certificate),
+        "certificate": certificate.to_dict(),
     }
 
 
@@ -204,16 +213,16 @@ def _decode(text: str) -> Alarm:
         raise _BadRecord(f"not an alarm record of the format {FORMAT}")
     if record.get("sha256") != _digest(record):
         raise _BadRecord("the SHA-256 does not match: the record was changed after it was written")
-    kind = next((kind for kind in KINDS if kind.name == record.get("kind")), None)
+    kind = KINDS.get(str(record.get("kind")))
     if kind is None:
-        raise _BadRecord(f"no certificate of a known kind; known are {', '.join(kind.name for kind in KINDS)}")
+        raise _BadRecord(f"no certificate of a known kind; known are {', '.join(KINDS)}")
     try:
         check_keys(record, _ENTRIES | ({"model"} & record.keys()))
         return Alarm(
             observer=_text(record["observer"]),
             sample=_number(record["sample"]),
             time=decode_float(record["time"]),
-            certificate=kind.decode(record["certificate"]),
+            certificate=kind.from_dict(record["certificate"]),
             source=_source(record["source"]),
             model=_text(record["model"]) if "model" in record else None,
         )

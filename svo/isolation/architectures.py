@@ -248,7 +248,7 @@ def _bounded(set: HPolytope) -> HPolytope | None:
 
 
 def _has_largest_set(observer: Observer) -> bool:
-    return getattr(observer.model, "start_range", None) is not None and hasattr(observer, "lose_set")
+    return observer.model.start_range is not None and observer.starts_without_set
 
 
 def _at_sample(k: int, age: int | None) -> int | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from inspect import signature
 from time import perf_counter
 from types import MappingProxyType
 from typing import Any
@@ -40,7 +39,7 @@ class Bank(ABC):
         self.names = logic.names
         self.observers: Mapping[str, Observer] = MappingProxyType(dict(observers))
         self._logic = logic
-        self._untimed = tuple(n for n, o in observers.items() if "deadline" not in signature(o.step).parameters)
+        self._untimed = tuple(n for n, o in observers.items() if not o.takes_deadline)
         check_observers(self.observers, same_states)
         self._forget()
 
@@ -121,13 +120,12 @@ class Bank(ABC):
         taken = self._own_samples(sample, self._sample)
         if not any(own is not None for own in taken.values()):
             raise ValueError(f"sample is {sample!r}; expected one in the window of a running observer")
-        last = {name: observer.window[1] for name, observer in self._running.items()}  # type: ignore[attr-defined]
+        last = {name: observer.window[1] for name, observer in self._running.items()}
 
         def late(name: str) -> Step:
             own, observer = taken[name], self._running[name]
             given = (self._nothing(), last[name]) if own is None else (y, own)
-            answer: Step = observer.late_update(*given)  # type: ignore[attr-defined]
-            return answer
+            return observer.late_update(*given)
 
         self._check_late(y, taken)
         steps = self._ask(late)
@@ -142,7 +140,7 @@ class Bank(ABC):
         for name, own in taken.items():
             if own is not None:
                 try:
-                    self._running[name].check_late(y, own)  # type: ignore[attr-defined]
+                    self._running[name].check_late(y, own)
                 except ValueError as error:
                     raise ValueError(f"observer {name!r}: {error}") from error
 
@@ -152,9 +150,9 @@ class Bank(ABC):
             raise ValueError(f"sample is {sample!r}; expected the number of a sample")
         found: dict[str, int | None] = {}
         for name, observer in self._running.items():
-            if not hasattr(observer, "late_update"):
+            if not observer.takes_late:
                 raise TypeError(f"observer {name!r} ({type(observer).__name__}) takes no measurements that come late")
-            first, last = observer.window  # type: ignore[attr-defined]
+            first, last = observer.window
             own = sample - newest + last
             found[name] = int(own) if first <= own <= last else None
         return found
@@ -258,9 +256,7 @@ class Bank(ABC):
 
         def timed(name: str) -> Step:
             share = max(0.0, end - perf_counter()) / next(left)
-            observer: Any = self._running[name]
-            answer: Step = observer.step(now.u, now.y, u_next=now.u_next, schedule=now.schedule, deadline=share)
-            return answer
+            return self._running[name].step(now.u, now.y, u_next=now.u_next, schedule=now.schedule, deadline=share)
 
         return self._ask(timed)
 
@@ -329,20 +325,20 @@ class Bank(ABC):
 
         None is a set that is lost. ``largest_at`` is that of what the set rests on, counted from the sample.
         """
-        observer: Any = self.observers[name]
-        physical = getattr(observer.model, "physical_range", None)
+        observer = self.observers[name]
+        physical = observer.model.physical_range
         if set is not None and physical is not None and not physical.cut(*set.bounding_box())[2]:
             set = None  # no state of it is one of the plant, as nothing has proven yet
         if set is not None:
             observer.reset(set)
             if largest_at is not None:
                 observer.largest_at = largest_at
-        elif hasattr(observer, "lose_set"):
+        elif observer.starts_without_set:
             observer.lose_set()
         else:
             kind = type(observer).__name__
             raise TypeError(f"observer {name!r} ({kind}) has no lose_set, and there is no bounded set to start it from")
-        return self.observers[name].update(self._nothing() if y is None else y, u=at.u_next, schedule=at.schedule)
+        return observer.update(self._nothing() if y is None else y, u=at.u_next, schedule=at.schedule)
 
     def _predict_from(self, name: str, set: HPolytope | None, now: Sample, largest_at: int | None) -> Step:
         """Start from the set of the sample before, leaving out the measurement that nothing explains.
@@ -370,8 +366,8 @@ class Bank(ABC):
 
 def largest_at(observers: Mapping[str, Observer], steps: Mapping[str, Step], names: Collection[str]) -> int | None:
     """Newest sample, counted from the present one, at which a set that one of these rests on was the largest set."""
-    own = [(steps[name], getattr(observers[name], "largest_at", None)) for name in names]
-    ages = [at - getattr(step, "sample", 0) for step, at in own if at is not None]
+    own = [(steps[name], observers[name].largest_at) for name in names]
+    ages = [at - step.sample for step, at in own if at is not None]
     return max(ages, default=None)
 
 

@@ -20,9 +20,12 @@ def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[s
             raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")
     observers = {NOMINAL: nominal, **faults}
     for name, observer in observers.items():
-        if not callable(getattr(observer, "step", None)):
+        if not isinstance(observer, Observer):
             kind = type(observer).__name__
-            raise TypeError(f"{name!r} is a {kind}; expected an observer, such as WindowObserver(model, initial)")
+            raise TypeError(
+                f"{name!r} is a {kind}; expected an observer, such as WindowObserver(model, initial): one of your own "
+                "is a subclass of svo.observers.base.Observer"
+            )
     return observers
 
 

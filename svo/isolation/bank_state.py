@@ -120,17 +120,15 @@ class BankState:
 
 def saved(name: str, observer: Observer) -> State:
     """The state of an observer of a bank."""
-    if not (hasattr(observer, "state_dict") and hasattr(type(observer), "from_state_dict")):
+    if not observer.saves_state:
         raise TypeError(f"observer {name!r} ({type(observer).__name__}) has no state_dict to save")
-    state: State = observer.state_dict()
-    return state
+    return observer.state_dict()
 
 
 def restored(name: str, observer: Observer, state: State) -> Observer:
     """An observer as a state describes it, which must be one like the bank's."""
-    again: Observer = type(observer).from_state_dict(observer.model, state)  # type: ignore[attr-defined]
-    options, wanted = getattr(again, "options", None), getattr(observer, "options", None)
-    if options is not None and wanted is not None and canonical(options) != canonical(wanted):
+    again = type(observer).from_state_dict(observer.model, state)
+    if canonical(again.options) != canonical(observer.options):
         raise ValueError(f"observer {name!r} has other options than this bank's")
     return again
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from svo.isolation.logic import GLOBAL, StateName
-from svo.observers.base import Step
+from svo.observers.base import Certificate, Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,7 @@ class BankRecord:
         Answers that were neither a proof nor a point.
     died_at : mapping of str to int or None
         First sample at which a model was declared falsified; "global" is there if its observer was.
-    certificates : mapping of str to certificate or None
+    certificates : mapping of str to Certificate or None
         Proof of that falsification.
     detected_at, isolated_at : int or None
         FIRST sample of the run at which a fault was detected, and at which one was isolated.
@@ -77,7 +76,7 @@ class BankRecord:
     seconds: NDArray[np.float64]
     undecided: NDArray[np.bool_]
     died_at: Mapping[str, int | None]
-    certificates: Mapping[str, Any]
+    certificates: Mapping[str, Certificate | None]
     detected_at: int | None
     isolated_at: int | None
     fault: str | None
@@ -94,7 +93,7 @@ class Recorder:
         self._seconds = np.full((samples, len(names)), np.nan)
         self._undecided = np.zeros((samples, len(names)), dtype=bool)
         self._died_at: dict[str, int | None] = dict.fromkeys(names)
-        self._certificates: dict[str, Any] = dict.fromkeys(names)
+        self._certificates: dict[str, Certificate | None] = dict.fromkeys(names)
         self._detected_at: int | None = None
         self._isolated_at: int | None = None
         self._fault: str | None = None

@@ -1,80 +1,390 @@
-"""What every observer answers at a sample."""
+"""What an observer is; its answers are in `svo.observers.answers`, its proofs in `svo.observers.certificate`.
+
+Public methods are checked and described here, once; an observer fills in the hooks behind them, which begin with an
+underscore and are given what has been checked.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Literal, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import Array
+from svo.checks import Array, is_count
+from svo.logs.drive import drive
+from svo.logs.log import Log
+from svo.models.model import UncertainModel, expect_model
+from svo.observers.answers import Record, Step, VerdictName
+from svo.observers.certificate import Certificate
+from svo.observers.data import (
+    check_may_start_by_step,
+    check_schedule,
+    inputs_of,
+    outputs_of,
+    seconds_allowed,
+)
+from svo.observers.first_states import first_box
+from svo.observers.saved_state import State, check_model, check_unchanged, last_schedule, sealed
 
-VerdictName = Literal["consistent", "falsified", "undecided"]
+__all__ = ["Certificate", "Observer", "Record", "Step", "VerdictName"]
 
 
-class Step(Protocol):
-    """The answer of an observer at one sample.
+class Observer(ABC):
+    """The set of states that a model and the data so far allow, sample by sample.
+
+    A kind of its own defines `_reset`, `_update` and `_step`, and the hooks of what else it declares that it can do.
+    Hooks get arrays of the right shapes: finite numbers, NaN in a measurement where a sensor is missing, zeros for an
+    input that is not needed. One that raises an error leaves the observer as it was. `_number` is the number of the
+    sample that a hook is asked about, or of the newest one. After a falsification no hook is asked until `reset`.
+
+    Parameters
+    ----------
+    model : UncertainModel
 
     Attributes
     ----------
-    verdict : {"consistent", "falsified", "undecided"}
-        "falsified" only with a certificate that has been checked in exact arithmetic.
-    reason : str or None
-        Why a verdict is "undecided", where it is known: "outgrown" (the set has grown beyond all bounds of use in a gap
-        of the measurements, and what came back does not yet bound the state), "outside the physical range" (of all that
-        the data allow, without a proof), "a reading is too large" (for a polytope, which then goes on without it).
-    certificate : object with ``verify()``, or None
-    seconds : float
-        Wall time of the call.
-    box : (lower, upper)
-        Bounds of the current state; infinite while the set is outgrown, NaN once the model is falsified.
-    set : HPolytope
-        The template set of the current state; empty once the model is falsified.
-    support(directions) : (k,) array
-        Outer bounds of d'x over the current state, for directions (k, n); -inf once the model is falsified.
+    kind : str
+        Name of the kind, in `options` and messages.
+    takes_deadline : bool
+        Whether `step` can stop at a deadline.
+    takes_late : bool
+        Whether `late_update` takes measurements that come late: `_oldest`, `_read_at` and `_late_update` are defined.
+    saves_state : bool
+        Whether it can be saved and go on: `_options`, `_state`, `_set_up` and `_resume` are defined.
+    starts_without_set : bool
+        Whether it can start with nothing known of the state: `_lose_set` is defined.
+    largest_at : int or None
+        Sample at which the set last started from the model's largest set, if what is known now rests on it.
     """
 
-    @property
-    def verdict(self) -> VerdictName: ...
+    kind: ClassVar[str] = "own"
+    takes_deadline: ClassVar[bool] = False
+    takes_late: ClassVar[bool] = False
+    saves_state: ClassVar[bool] = False
+    starts_without_set: ClassVar[bool] = False
+
+    model: UncertainModel
+    largest_at: int | None = None
+    _number: int = -1
+    _schedule: Any = None  # of the newest sample
+    _alarm: Step | None = None
+
+    def __init__(self, model: UncertainModel) -> None:
+        expect_model("model", model)
+        self.model = model
+
+    # -- samples -----------------------------------------------------------------------------------
 
     @property
-    def certificate(self) -> Any: ...
-
-    @property
-    def seconds(self) -> float: ...
-
-    @property
-    def reason(self) -> str | None: ...
-
-    @property
-    def box(self) -> tuple[Array, Array]: ...
-
-    @property
-    def set(self) -> HPolytope: ...
-
-    def support(self, directions: Any) -> Array: ...
-
-
-class Observer(Protocol):
-    """The protocol that isolation banks use; every observer of the package has it."""
-
-    model: Any
-
-    def update(self, y0: Any, u: Any = None, schedule: Any = None) -> Step:
-        """A measurement without a transition (the first one)."""
-        ...
-
-    @property
-    def step(self) -> Callable[..., Step]:
-        """Called as step(u, y, u_next=None, schedule=None): one transition driven by u, then the measurement y.
-
-        It may take a ``deadline`` in seconds besides.
-        """
-        ...
+    def needs_next_input(self) -> bool:
+        """Whether `step` needs ``u_next``, and `update` its ``u``."""
+        return self.model.uses_input_in_output
 
     def reset(self, set: HPolytope) -> None:
-        """Forget all data and start again from a set of states."""
-        ...
+        """Forget all data; the state at the next measurement lies in ``set``.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the set is no polytope, empty, unbounded or of the wrong dimension, or outside the model's physical
+            range. The observer is unchanged.
+        """
+        self._reset(set, *first_box(set, self.model))
+        self._forget()
+
+    def lose_set(self) -> None:
+        """Forget all data; nothing is known of the state at the next measurement.
+
+        The observer starts from the model's largest set, or is undecided until the readings alone bound the state.
+
+        Raises
+        ------
+        TypeError
+            If it cannot start without a set (`starts_without_set`).
+        """
+        self._check_can(self.starts_without_set, "has no lose_set: it cannot start without a set")
+        self._forget()
+        self._lose_set()
+
+    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Step:
+        """The first measurement, without a transition.
+
+        Parameters
+        ----------
+        y0 : (ny,) array
+            NaN = that sensor is missing.
+        u : (nu,) array, optional
+            Needed where `step` needs ``u_next``.
+        schedule : optional
+            Scheduling value at this sample.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As `step`, and if there was a first sample already.
+        """
+        begun = perf_counter()
+        if self._number >= 0:
+            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
+        outputs = outputs_of(self.model, y0)
+        inputs = inputs_of(self.model, "u", u, self.needs_next_input)
+        check_schedule(self.model, schedule)
+        return self._ask(begun, schedule, lambda: self._update(outputs, inputs, schedule))
+
+    def step(
+        self,
+        u: ArrayLike | None,
+        y: ArrayLike,
+        u_next: ArrayLike | None = None,
+        schedule: Any = None,
+        deadline: float | None = None,
+    ) -> Step:
+        """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
+
+        Parameters
+        ----------
+        u : (nu,) array
+        y : (ny,) array
+            NaN = that sensor is missing; all NaN = prediction only.
+        u_next : (nu,) array, optional
+            u(k+1); needed only if D or a D_i is not zero, or, for observers that keep one Delta in state and output, if
+            an uncertainty of B reaches the output: B_i, and C_i, c_i or F_i, are not zero for one i.
+        schedule : optional
+            Scheduling value at the sample of y; it also gives the matrices of the next transition.
+        deadline : float, optional
+            Seconds >= 0 after which the programs stop where they are: the arrival set is then wider but still
+            contains the state, and the verdict is "undecided" if emptiness could not be decided. What is left
+            then takes a few microseconds a direction. The exact proof of an alarm, a few milliseconds once, is
+            not cut short. Results depend on the machine's speed. Only where `takes_deadline`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            For a wrong shape, an infinite or missing value, a schedule that gives no finite matrices, a scheduled
+            model whose first call is not `update`, or a deadline that the observer does not take. The observer is
+            unchanged.
+        """
+        begun = perf_counter()
+        if deadline is not None:
+            self._check_can(self.takes_deadline, "has no deadline: leave it out")
+            deadline = begun + seconds_allowed(deadline)
+        inputs = inputs_of(self.model, "u", u, True)
+        following = inputs_of(self.model, "u_next", u_next, self.needs_next_input)
+        outputs = outputs_of(self.model, y)
+        check_schedule(self.model, schedule)
+        if self._alarm is not None:
+            return replace(self._alarm, seconds=perf_counter() - begun)
+        if self._number < 0:
+            check_may_start_by_step(self.model)
+            self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
+        return self._ask(begun, schedule, lambda: self._step(inputs, outputs, following, schedule, deadline))
+
+    def run(self, log: Log) -> Record:
+        """All samples of a log, with the box of the state at each.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As `update` and `step`; if the log is no `svo.Log`, has no samples, or the observer has started already.
+        """
+        steps, boxes = [], []
+        for step in drive(self, log):
+            steps.append(step)
+            boxes.append(step.box)  # it is that of the newest sample only
+        lower, upper = (np.array(ends) for ends in zip(*boxes, strict=True))
+        seconds = np.array([s.seconds for s in steps])
+        return Record(tuple(s.verdict for s in steps), lower, upper, seconds, steps[-1].certificate)
 
     def warm_up(self) -> float:
-        """Compile whatever a step needs; returns the seconds that it took."""
-        ...
+        """Load and compile whatever a step can need, without touching this observer; returns the seconds it took."""
+        begun = perf_counter()
+        self._warm_up()
+        return perf_counter() - begun
+
+    # -- measurements that come late -----------------------------------------------------------------
+
+    def late_update(self, y: ArrayLike, sample: int) -> Step:
+        """A measurement that arrives after its sample, while that sample is still in the window.
+
+        Its rows stand where they would have stood; the answer is about the newest sample, as that of the last
+        `step`, which it replaces. Alarms and their certificates, saved states and sets then include it.
+
+        Parameters
+        ----------
+        y : (ny,) array
+            Measured at ``sample``; NaN for the sensors that did not arrive now.
+        sample : int
+            Number of that sample (`Step.sample` counts from 0), within `window`.
+
+        Raises
+        ------
+        TypeError
+            If the observer takes no measurements that come late (`takes_late`).
+        ValueError
+            For a sample outside the window, a sensor that has been read there already, or a bad ``y``. The
+            observer is unchanged.
+        """
+        begun = perf_counter()
+        outputs = self._late_outputs(y, sample)
+        if self._alarm is not None:
+            return replace(self._alarm, seconds=perf_counter() - begun)
+        return self._answered(self._late_update(outputs, int(sample)), begun)
+
+    def check_late(self, y: ArrayLike, sample: int) -> None:
+        """Raise what `late_update` would raise; nothing changes."""
+        self._late_outputs(y, sample)
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """First and last sample that a late measurement may be of.
+
+        Raises
+        ------
+        TypeError
+            If the observer takes no measurements that come late (`takes_late`).
+        ValueError
+            Before the first sample.
+        """
+        self._check_can(self.takes_late, "takes no measurements that come late")
+        if self._number < 0:
+            raise ValueError("there is no sample yet; call update(y0), with NaN if there is no measurement")
+        return self._oldest, self._number
+
+    # -- saved states ------------------------------------------------------------------------------------
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
+        return {"kind": self.kind, **self._options()}
+
+    def state_dict(self) -> dict[str, NDArray[Any]]:
+        """Everything that the next steps depend on, as named arrays (for ``numpy.savez``).
+
+        Raises
+        ------
+        TypeError
+            If the observer cannot be saved (`saves_state`), or the schedule of the last sample is no number or array
+            of numbers.
+        """
+        self._check_can(self.saves_state, "has no state_dict: it cannot be saved")
+        return sealed(self._state(), self.model, self.options, self._schedule)
+
+    @classmethod
+    def from_state_dict(cls, model: UncertainModel, state: State) -> Self:
+        """The observer that `state_dict` described, to continue bit for bit with the same model.
+
+        Raises
+        ------
+        TypeError
+            If observers of this kind cannot be saved (`saves_state`).
+        ValueError
+            If the state is not that of such an observer of this very model, or was changed since.
+        """
+        observer = cls.__new__(cls)
+        observer._check_can(cls.saves_state, "has no state_dict: it cannot be saved")
+        try:
+            check_unchanged(state)
+            observer._set_up(model, state)
+            check_model(state, model, observer.options)
+            alarm = observer._resume(state)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise ValueError(f"state does not belong to a {cls.kind} observer of this model: {error}") from error
+        observer._schedule = last_schedule(state)
+        observer._alarm = None if alarm is None else replace(alarm, sample=observer._number)
+        return observer
+
+    # -- hooks of every observer -------------------------------------------------------------------------
+
+    @abstractmethod
+    def _reset(self, set: HPolytope, lower: Array, upper: Array) -> None:
+        """Start from a set; its box within the physical range is known by now."""
+
+    @abstractmethod
+    def _update(self, y: Array, u: Array, schedule: Any) -> Step:
+        """The first measurement."""
+
+    @abstractmethod
+    def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> Step:
+        """A transition and a measurement, by the time ``end`` of `time.perf_counter` if there is one."""
+
+    def _warm_up(self) -> None:  # noqa: B027
+        """As `warm_up`; nothing, unless something is compiled or loaded late."""
+
+    # -- hooks of what some can do -----------------------------------------------------------------------
+
+    @property
+    def _oldest(self) -> int:
+        """First sample of `window`."""
+        raise NotImplementedError
+
+    def _read_at(self, sample: int) -> Array:
+        """What was read at a sample of the window; NaN where a sensor is missing."""
+        raise NotImplementedError
+
+    def _late_update(self, y: Array, sample: int) -> Step:
+        """A late measurement of a sample of the window; the answer is about the newest sample."""
+        raise NotImplementedError
+
+    def _lose_set(self) -> None:
+        """Start with nothing known but the model's ranges."""
+        raise NotImplementedError
+
+    def _options(self) -> Mapping[str, Any]:
+        """The options besides the kind."""
+        return {}
+
+    def _state(self) -> dict[str, NDArray[Any]]:
+        """The arrays of a saved state."""
+        raise NotImplementedError
+
+    def _set_up(self, model: UncertainModel, state: State) -> None:
+        """Take model and options from a state, as the constructor does from its arguments."""
+        raise NotImplementedError
+
+    def _resume(self, state: State) -> Step | None:
+        """Take the rest, `_number` too; the answer of a falsification, proven again, if there was one."""
+        raise NotImplementedError
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _forget(self) -> None:
+        self._number, self._alarm, self._schedule, self.largest_at = -1, None, None, None
+
+    def _ask(self, begun: float, schedule: Any, hook: Callable[[], Step]) -> Step:
+        """The answer of a hook at the next sample."""
+        self._number += 1
+        try:
+            step = hook()
+        except BaseException:
+            self._number -= 1
+            raise
+        self._schedule = schedule
+        return self._answered(step, begun)
+
+    def _answered(self, step: Step, begun: float) -> Step:
+        step = replace(step, sample=self._number, seconds=perf_counter() - begun)
+        if step.verdict == "falsified":
+            self._alarm = step
+        return step
+
+    def _late_outputs(self, y: ArrayLike, sample: int) -> Array:
+        """A late measurement that has been checked."""
+        first, last = self.window
+        outputs = outputs_of(self.model, y)
+        if self._alarm is None:
+            if not (is_count(sample, first) and sample <= last):
+                raise ValueError(f"sample is {sample!r}; expected one in the window, which holds {first} to {last}")
+            read = ~np.isnan(outputs) & ~np.isnan(self._read_at(sample))
+            if read.any():
+                raise ValueError(f"y has a value of sensor {int(np.argmax(read))}, which was already read at {sample}")
+        return outputs
+
+    def _check_can(self, able: bool, why_not: str) -> None:
+        if not able:
+            raise TypeError(f"{type(self).__name__} {why_not}")

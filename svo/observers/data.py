@@ -1,7 +1,4 @@
-"""What a user hands to an observer: checks of a sample's data.
-
-The window observer looks at shapes here and at the numbers in its kernel.
-"""
+"""What a user hands to an observer: checks of a sample's data and of settings that several observers have."""
 
 from __future__ import annotations
 
@@ -10,28 +7,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array, finite_array, floats, real_number
+from svo.checks import Array, finite_array, floats, is_finite_number, real_number
 from svo.models.model import UncertainModel
-
-
-def outputs_shaped(model: UncertainModel, y: ArrayLike) -> Array:
-    """A measurement (ny,), NaN where a sensor is missing; its numbers have not been looked at."""
-    array = floats("y", y, missing=True)
-    if array.shape != (model.n_outputs,):
-        raise ValueError(f"y has shape {array.shape}; expected ({model.n_outputs},), one value a sensor")
-    return array
 
 
 def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:
     """A measurement (ny,), NaN where a sensor is missing."""
-    array = outputs_shaped(model, y)
+    array = floats("y", y, missing=True)
+    if array.shape != (model.n_outputs,):
+        raise ValueError(f"y has shape {array.shape}; expected ({model.n_outputs},), one value a sensor")
     if np.isinf(array).any():
         raise ValueError(f"y is {array}; expected finite numbers, or NaN for a missing sensor")
     return array
 
 
-def inputs_shaped(model: UncertainModel, name: str, u: ArrayLike | None, needed: bool) -> Array:
-    """An input (nu,) whose numbers have not been looked at; zeros where it is not needed."""
+def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: bool) -> Array:
+    """An input (nu,); zeros where it is not needed."""
     size = model.n_inputs
     if not needed or (u is None and size == 0):
         return np.zeros(size)
@@ -41,12 +32,6 @@ def inputs_shaped(model: UncertainModel, name: str, u: ArrayLike | None, needed:
     array = floats(name, u)
     if array.shape != (size,):
         raise ValueError(f"{name} has shape {array.shape}; expected ({size},), one value an input")
-    return array
-
-
-def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: bool) -> Array:
-    """An input (nu,); zeros where it is not needed."""
-    array = inputs_shaped(model, name, u, needed)
     if not np.isfinite(array).all():
         raise ValueError(f"{name} is {array}; expected finite numbers")
     return array
@@ -75,13 +60,19 @@ def seconds_allowed(deadline: Any) -> float:
 
 def stack_at(model: UncertainModel, schedule: Any) -> Array:
     """The stack of a model at a sample, all finite."""
-    check_schedule(model, schedule)
     stack = model.stack(schedule)
     if not np.isfinite(stack).all():
-        raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected numbers")
+        raise ValueError(f"the model's matrices at schedule {schedule!r} contain NaN or Inf; expected finite numbers")
     return stack
 
 
 def directions_of(directions: ArrayLike, n: int) -> Array:
     """Directions (k, n) of a support."""
     return finite_array("directions", directions, ("k", n))
+
+
+def relative_slack(eps: Any) -> float:
+    """The slack ``eps`` of an observer's measurement rows."""
+    if not (is_finite_number(eps) and eps >= 0):
+        raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
+    return float(eps)

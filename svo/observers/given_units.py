@@ -14,13 +14,14 @@ from polytopes import Certificate, HPolytope
 from polytopes.exact import rational
 from svo.checks import Array
 from svo.models.normal_form import NormalForm, lengthened, set_in
-from svo.observers.polytope.step import (
+from svo.observers.polytope.certificate import (
     AnyCertificate,
     MeasuredOutput,
     PolytopeCertificate,
     PublishedCertificate,
 )
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate, WindowSample
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet, WindowSample
 from svo.observers.zonotope.certificate import ZonotopeCertificate
 from svo.observers.zonotope.zonotope import ConstrainedZonotope
 

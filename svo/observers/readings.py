@@ -23,6 +23,7 @@ OUTSIDE = "outside the physical range"
 TOO_LARGE = "a reading is too large"
 NO_SAMPLE = -(2**62)  # stands for none in saved states; numbers may be negative after a bank's restart
 _ROOM = 1.01  # times the half-width of a start: the set is the start of a window, whose readings shrink it at once
+_PREFIX = "readings."  # of the names of their arrays
 _EXTRA = 10  # samples more than states, of which the readings are tried
 
 
@@ -79,11 +80,12 @@ class Readings:
 
     def state(self) -> dict[str, Array]:
         """The samples as named arrays."""
-        return {f: np.array([getattr(s, f) for s in self.samples]) for f in Reading._fields} if self.samples else {}
+        names = Reading._fields if self.samples else ()
+        return {f"{_PREFIX}{name}": np.array([getattr(s, name) for s in self.samples]) for name in names}
 
     def restore(self, state: Mapping[str, Array]) -> None:
         """Take back what `state` gave."""
-        columns: list[Any] = [state.get(f, ()) for f in Reading._fields]
+        columns: list[Any] = [state.get(f"{_PREFIX}{name}", ()) for name in Reading._fields]
         self.samples.extend(Reading(*(np.array(v) for v in values)) for values in zip(*columns, strict=True))
 
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +77,50 @@ def decode_set(record: Any) -> HPolytope:
     """A polytope that `encode_value` wrote."""
     arrays = decode_arrays(record, set("AbCd"))
     return HPolytope(*(arrays[part] for part in "AbCd"))
+
+
+def decode_value(kind: Any, record: Any) -> Any:
+    """What `encode_value` wrote of a value of this type.
+
+    Parameters
+    ----------
+    kind : type
+        `Array`, an array of integers, int, bool, `HPolytope`, `Certificate`, a dataclass whose fields are of these, or
+        a tuple of them; fields that may be None are then missing.
+    """
+    if isinstance(kind, UnionType):
+        (kind,) = (item for item in get_args(kind) if item is not NoneType)
+    if get_origin(kind) is tuple:
+        return tuple(decode_value(get_args(kind)[0], item) for item in _list(record))
+    for known, decode in _DECODERS:
+        if kind == known:
+            return decode(record)
+    kinds, optional = _fields(kind)
+    check_keys(record, kinds.keys() - (optional - record.keys() if isinstance(record, Mapping) else set()))
+    return kind(**{name: decode_value(kinds[name], value) for name, value in record.items()})
+
+
+def _decode_truth(value: Any) -> bool:
+    if type(value) is not bool:
+        raise TypeError(f"expected true or false, found {_short(value)}")
+    return value
+
+
+_DECODERS = (
+    (Array, decode_array),
+    (NDArray[np.int64], decode_integers),
+    (int, decode_integer),
+    (bool, _decode_truth),
+    (HPolytope, decode_set),
+    (Certificate, Certificate.from_dict),
+)
+
+
+@cache
+def _fields(kind: type) -> tuple[dict[str, Any], set[str]]:
+    """Types of a dataclass' fields by name, and the names of those that may be missing."""
+    hints, entries = get_type_hints(kind), fields(kind)
+    return {f.name: hints[f.name] for f in entries}, {f.name for f in entries if f.default is None}
 
 
 def check_keys(record: Any, names: set[str]) -> None:

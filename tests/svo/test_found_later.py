@@ -18,8 +18,7 @@ from numba.core.errors import TypingError
 
 import svo
 from polytopes import HPolytope
-from svo import ArchitectureI, PolytopeObserver, UncertainModel, WindowObserver
-from svo.isolation.alarms import Alarm
+from svo import ArchitectureI, UncertainModel, WindowObserver
 from tests.svo.studies.isolation.test_runner import configuration
 
 FAILED = pytest.fail.Exception  # of pytest.raises
@@ -42,14 +41,6 @@ def cart_observer() -> WindowObserver:
 # -- the house -------------------------------------------------------------------------------------------------------
 
 
-@later("B1", AttributeError, "an alarm of a polytope observer ends the watch that shows it")
-def test_a_watch_shows_the_alarm_of_a_polytope_observer() -> None:
-    from svo.detection.watch.view import alarm_text
-
-    observer = PolytopeObserver(cart(), HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
-    observer.update([0.0])
-    step = observer.step([1.0], [9.0])
-    assert "falsified" in alarm_text(Alarm("nominal", 1, 0.1, step.certificate, {}))
 
 
 @later("B12", RuntimeError, "one failing run makes a study unfinishable")

@@ -183,8 +183,8 @@ def conclusion(status: Status) -> str:
 def alarm_text(alarm: Alarm) -> str:
     """A falsification and what its certificate says, checked again here."""
     certificate = alarm.certificate
-    steps = certificate.last - certificate.first
-    window = f"samples {alarm.sample - steps} to {alarm.sample}"
+    first = alarm.sample + 1 - len(certificate.samples)
+    window = f"sample {first}" if first == alarm.sample else f"samples {first} to {alarm.sample}"
     holds = "holds in exact arithmetic" if certificate.verify() else "DOES NOT HOLD"
     return f"ALARM {alarm.time:g} s: {alarm.observer} is falsified; its certificate over {window} {holds}"
 

@@ -8,6 +8,7 @@ from polytopes import HPolytope
 from svo.checks import Array
 from svo.models.model import UncertainModel
 from svo.models.state_range import StateRange
+from svo.observers.answers import between
 from svo.observers.polytope.sets import Sample
 from svo.observers.polytope.vertex_images import limited, reach_of
 from svo.observers.window_kernel import LARGEST
@@ -68,8 +69,4 @@ def within_physical(physical: StateRange | None, P: HPolytope) -> HPolytope:
 
 def anywhere(n: int, physical: StateRange | None) -> HPolytope:
     """All states (n,), or those of the physical range."""
-    if physical is None:
-        return HPolytope.whole_space(n)
-    bounds = np.concatenate([physical.upper, -physical.lower])
-    known = np.isfinite(bounds)
-    return HPolytope(np.vstack([np.eye(n), -np.eye(n)])[known], bounds[known])
+    return HPolytope.whole_space(n) if physical is None else between(np.eye(n), physical.lower, physical.upper)

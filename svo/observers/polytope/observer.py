@@ -4,23 +4,33 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from time import perf_counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from polytopes import HPolytope, warm_up
-from svo.checks import Array, is_count, is_finite_number
-from svo.logs.drive import drive
-from svo.logs.log import Log
-from svo.models.model import UncertainModel, expect_model
+from polytopes import HPolytope, UndecidedError, warm_up
+from svo.checks import Array, is_count
+from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm, set_in
 from svo.models.stack import may_be_nonzero
-from svo.observers.data import check_may_start_by_step, inputs_of, outputs_of, stack_at
-from svo.observers.polytope.limits import readable, within_physical
-from svo.observers.polytope.restart import RestartingPolytope
-from svo.observers.polytope.sets import PublishedRecursion, Sample, SoundRecursion
+from svo.observers.base import Observer
+from svo.observers.data import relative_slack, stack_at
+from svo.observers.first_states import finite_box
+from svo.observers.free_start import Reading
+from svo.observers.given_units import polytope_proof_out
+from svo.observers.polytope.certificate import PolytopeCertificate
+from svo.observers.polytope.limits import (
+    FLOATS_TELL_APART,
+    anywhere,
+    cut_to,
+    is_of_use,
+    reach_ahead,
+    readable,
+    within_physical,
+)
+from svo.observers.polytope.sets import Outcome, PublishedRecursion, Recursion, Sample, SoundRecursion
 from svo.observers.polytope.state import (
     read_outcome,
     read_sample,
@@ -29,10 +39,10 @@ from svo.observers.polytope.state import (
     write_sample,
     write_set,
 )
-from svo.observers.polytope.step import PolytopeRecord, PolytopeStep
-from svo.observers.readings import NO_SAMPLE
-from svo.observers.saved_state import check_model, check_unchanged, last_schedule, sealed
-from svo.observers.window.setup import finite_box
+from svo.observers.polytope.step import PolytopeStep
+from svo.observers.polytope.vertex_images import transitions
+from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, TOO_LARGE, Readings
+from svo.observers.window_kernel import LARGEST
 
 _PUBLISHED_STACKS = 4096
 
@@ -44,7 +54,7 @@ UNSOUND = (
 )
 
 
-class PolytopeObserver(RestartingPolytope):
+class PolytopeObserver(Observer):
     """Set-valued observer on explicit polytopes (Rosa and Silvestre 2013, section 2), in a form that is sound.
 
     The set of the next state is the intersection over m = 1..N of the hulls, over the vertices of Delta, of the
@@ -83,6 +93,9 @@ class PolytopeObserver(RestartingPolytope):
     and uncertainties: meant for small models and as a reference; `WindowObserver` is the fast one.
     """
 
+    kind = "polytope"
+    saves_state = starts_without_set = True
+
     def __init__(
         self,
         model: UncertainModel,
@@ -92,11 +105,10 @@ class PolytopeObserver(RestartingPolytope):
         eps: float = 1e-9,
         as_published: bool = False,
     ) -> None:
-        expect_model("model", model)
+        super().__init__(model)
         if not is_count(horizon, 1):
             raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1")
-        if not (is_finite_number(eps) and eps >= 0):
-            raise ValueError(f"eps is {eps}; expected a relative slack >= 0, such as 1e-9")
+        slack = relative_slack(eps)
         coupled = _is_coupled(model)
         smallest = 2 * (model.n_states + (model.n_disturbances if coupled else 0))
         if max_facets is not None and not is_count(max_facets, smallest):
@@ -107,7 +119,7 @@ class PolytopeObserver(RestartingPolytope):
             _check_published(model, coupled, int(horizon))
             warnings.warn(UNSOUND, UserWarning, stacklevel=2)
         form = NormalForm.at(model, *finite_box(initial, model.n_states))
-        self._configure(form, int(horizon), max_facets, float(eps), as_published)
+        self._configure(form, int(horizon), max_facets, slack, as_published)
         self.reset(initial)
 
     def _configure(
@@ -115,150 +127,195 @@ class PolytopeObserver(RestartingPolytope):
     ) -> None:
         self.model, self._form, self._normal = form.given, form, form.model
         self.horizon, self.max_facets, self.eps = horizon, max_facets, eps
+        self._recursion: Recursion
         if as_published:
             self._recursion = PublishedRecursion(form.model, horizon, max_facets, eps)
         else:
             self._recursion = SoundRecursion(form.model, horizon, max_facets, eps, _is_coupled(form.given))
 
-    def reset(self, set: HPolytope) -> None:
-        """Forget all data; the state at the next measurement lies in ``set``.
+    # -- the hooks -------------------------------------------------------------------------------
 
-        Raises
-        ------
-        ValueError
-            If the set is empty, unbounded or of the wrong dimension, or outside the model's physical range.
-        """
-        finite_box(set, self.model.n_states)
-        self._forget(within_physical(self._normal.physical_range, set_in(set, self._form.x)))
+    def _reset(self, set: HPolytope, lower: Array, upper: Array) -> None:
+        self._begin_from(within_physical(self._normal.physical_range, set_in(set, self._form.x)))
 
-    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> PolytopeStep:
-        """The first measurement, without a transition.
+    def _begin_from(self, initial: HPolytope) -> None:
+        """Nothing is known but a set of first states."""
+        self._initial = initial
+        self._last: tuple[Sample, Outcome] | None = None
+        self._readings: Readings | None = None  # of an observer that has lost its set
 
-        Parameters
-        ----------
-        y0 : (ny,) array
-            NaN = that sensor is missing.
-        u : (nu,) array, optional
-            Needed only if D or a D_i is not zero.
-        schedule : optional
-            Scheduling value at this sample.
-        """
-        begun = perf_counter()
-        if self._number >= 0:
-            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
-        sample = self._sample(0, y0, inputs_of(self.model, "u", u, self.model.uses_input_in_output), schedule)
-        return self._answer(sample.u, sample, y0, begun)
+    def _lose_set(self) -> None:
+        largest = self._normal.start_range
+        if largest is None:
+            self._lose()
+        else:
+            self._begin_from(HPolytope.box(largest.lower, largest.upper))
+            self.largest_at = 0
 
-    def step(
-        self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None
-    ) -> PolytopeStep:
-        """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
+    def _lose(self) -> None:
+        """There is no set any more."""
+        self._last, self.largest_at = None, None
+        self._readings = Readings(self._normal, self.eps, self.horizon)
 
-        Parameters
-        ----------
-        u : (nu,) array
-        y : (ny,) array
-            NaN = that sensor is missing; all NaN = prediction only.
-        u_next : (nu,) array, optional
-            u(k+1); needed only if D or a D_i is not zero.
-        schedule : optional
-            Scheduling value at the sample of y; it also gives the matrices of the next transition.
+    def _update(self, y: Array, u: Array, schedule: Any) -> PolytopeStep:
+        sample = self._sample(y, u, schedule)
+        if self._readings is not None:
+            return self._checked(self._without_set(sample.u, sample), sample, y)
+        return self._checked(self._begin(sample), sample, y)
 
-        Raises
-        ------
-        ValueError
-            For a wrong shape, an infinite or missing value, or a scheduled model whose first call is not `update`. The
-            observer is unchanged.
-        FacetLimitError
-            In exact mode, when a set has too many facets, or Qhull fails on it. The observer is unchanged.
-        UndecidedError
-            If a set is too thin for any linear program to settle. The observer is unchanged.
-        """
-        begun = perf_counter()
-        inputs = inputs_of(self.model, "u", u, True)
-        following = inputs_of(self.model, "u_next", u_next, self.model.uses_input_in_output)
-        if self._number < 0:
-            check_may_start_by_step(self.model)
-            self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
-        sample = self._sample(self._number + 1, y, following, schedule)
-        return self._answer(self._form.inputs(inputs), sample, y, begun)
+    def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> PolytopeStep:
+        sample, driven = self._sample(y, u_next, schedule), self._form.inputs(u)
+        if self._readings is not None:
+            step = self._without_set(driven, sample)
+        else:
+            step = self._go_on(driven, sample) or self._give_up(driven, sample)
+        return self._checked(step, sample, y)
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """What besides model and sets decides what the observer answers: it is part of what names a saved state."""
+    def _warm_up(self) -> None:
+        warm_up()
+
+    def _options(self) -> dict[str, Any]:
         published = isinstance(self._recursion, PublishedRecursion)
         limits = {"horizon": self.horizon, "max_facets": self.max_facets}
-        return {"kind": "polytope", **limits, "eps": self.eps, "as_published": published}
+        return {**limits, "eps": self.eps, "as_published": published}
 
-    def state_dict(self) -> dict[str, NDArray]:
-        """Everything that the next steps depend on, as named arrays (for ``numpy.savez``)."""
+    def _state(self) -> dict[str, NDArray[Any]]:
         facets = -1 if self.max_facets is None else self.max_facets
         published = isinstance(self._recursion, PublishedRecursion)
-        state: dict[str, NDArray] = {"settings": np.array([self.horizon, facets, self.eps, published])}
+        state: dict[str, NDArray[Any]] = {"settings": np.array([self.horizon, facets, self.eps, published])}
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state["restart"] = np.array([self._number, largest, self._readings is not None])
         state |= self._form.state_dict() | write_set("initial", self._initial)
         if self._readings is not None:
-            state |= {f"readings.{name}": value for name, value in self._readings.state().items()}
+            state |= self._readings.state()
         if self._last is not None:
             sample, outcome = self._last
             state |= write_sample("sample", sample) | write_outcome("outcome", outcome)
-        return sealed(state, self.model, self.options, self._schedule)
+        return state
 
-    @classmethod
-    def from_state_dict(cls, model: UncertainModel, state: Mapping[str, NDArray]) -> PolytopeObserver:
-        """The observer that `state_dict` described, to continue bit for bit with the same model.
+    def _set_up(self, model: UncertainModel, state: Mapping[str, NDArray[Any]]) -> None:
+        horizon, facets, eps, published = (float(v) for v in state["settings"])
+        limit = None if facets < 0 else int(facets)
+        self._configure(NormalForm.from_state_dict(model, state), int(horizon), limit, eps, bool(published))
 
-        Raises
-        ------
-        ValueError
-            If the state is not that of a polytope observer of this very model, or was changed since.
-        """
-        try:
-            check_unchanged(state)
-            horizon, facets, eps, published = (float(v) for v in state["settings"])
-            limit = None if facets < 0 else int(facets)
-            observer = cls.__new__(cls)
-            observer._configure(NormalForm.from_state_dict(model, state), int(horizon), limit, eps, bool(published))
-            observer._forget(read_set(state, "initial"))
-            if "sample.stack" in state:
-                sample = read_sample(state, "sample")
-                if sample.stack.shape != model.stack(model.schedule).shape:
-                    raise ValueError(f"its stack has shape {sample.stack.shape}")
-                observer._last = sample, read_outcome(state, "outcome")
-            check_model(state, model, observer.options)
-            observer._schedule = last_schedule(state)
-            observer._restore(state)
-        except (KeyError, IndexError, TypeError, ValueError) as error:
-            raise ValueError(f"state does not belong to a polytope observer of this model: {error}") from error
-        return observer
+    def _resume(self, state: Mapping[str, NDArray[Any]]) -> PolytopeStep | None:
+        self._begin_from(read_set(state, "initial"))
+        number, largest, lost = (int(v) for v in state["restart"])
+        self._number, self.largest_at = number, None if largest == NO_SAMPLE else largest
+        if lost:
+            self._readings = Readings(self._normal, self.eps, self.horizon)
+            self._readings.restore(state)
+        if "sample.stack" not in state:
+            return None
+        sample, outcome = read_sample(state, "sample"), read_outcome(state, "outcome")
+        if sample.stack.shape != self.model.stack(self.model.schedule).shape:
+            raise ValueError(f"its stack has shape {sample.stack.shape}")
+        self._last = sample, outcome
+        return self._answer(outcome) if outcome.verdict == "falsified" else None
 
-    def run(self, log: Log) -> PolytopeRecord:
-        """All samples of a log, with the box of the state at each."""
-        steps = list(drive(self, log))
-        boxes = np.array([step.box for step in steps])
-        return PolytopeRecord(
-            verdicts=tuple(step.verdict for step in steps),
-            lower=boxes[:, 0],
-            upper=boxes[:, 1],
-            facets=np.array([len(step.joint.b) for step in steps]),
-            seconds=np.array([step.seconds for step in steps]),
-            certificate=steps[-1].certificate,
-        )
+    # -- inside ------------------------------------------------------------------------------------
 
-    def warm_up(self) -> float:
-        """Compile the linear programs, without touching this observer; returns the seconds it took."""
-        begun = perf_counter()
-        warm_up()
-        return perf_counter() - begun
-
-    def _sample(self, number: int, y: ArrayLike, u: Array, schedule: Any) -> Sample:
+    def _sample(self, y: Array, u: Array, schedule: Any) -> Sample:
         """Model and data of a sample, in normal form."""
-        outputs, form = outputs_of(self.model, y), self._form
-        stack, self._schedule = stack_at(form.model, schedule), schedule
-        lower, upper, noise = form.model.bounds(schedule)
-        disturbances, read = self._disturbances(lower, upper), readable(form.outputs(outputs))
-        return Sample(number, stack, disturbances, noise, form.inputs(u), read, (lower, upper))
+        form = self._form
+        stack, (lower, upper, noise) = stack_at(form.model, schedule), form.model.bounds(schedule)
+        disturbances, read = self._disturbances(lower, upper), readable(form.outputs(y))
+        return Sample(self._number, stack, disturbances, noise, form.inputs(u), read, (lower, upper))
+
+    def _checked(self, step: PolytopeStep, sample: Sample, y: Array) -> PolytopeStep:
+        """An answer that says so where a reading was too large to count."""
+        if step.verdict == "consistent" and (np.isnan(sample.y) & ~np.isnan(y)).any():
+            return replace(step, verdict="undecided", reason=TOO_LARGE)
+        return step
+
+    def _keep(self, sample: Sample, outcome: Outcome) -> PolytopeStep:
+        reason = None
+        if isinstance(outcome.certificate, PolytopeCertificate):
+            outcome = outcome._replace(certificate=replace(outcome.certificate, largest_at=self.largest_at))
+        if outcome.verdict != "falsified" and self._normal.physical_range is not None:
+            joint, meets = cut_to(outcome.joint, self._normal.physical_range, self.max_facets)
+            if not meets:  # not proven, so no alarm
+                outcome, reason = outcome._replace(verdict="undecided"), OUTSIDE
+            outcome = outcome._replace(joint=joint)
+        self._last = sample, outcome
+        return self._answer(outcome, reason)
+
+    def _answer(self, outcome: Outcome, reason: str | None = None) -> PolytopeStep:
+        certificate = None if outcome.certificate is None else polytope_proof_out(outcome.certificate, self._form)
+        return PolytopeStep(outcome.joint, self._form, verdict=outcome.verdict, certificate=certificate, reason=reason)
+
+    def _disturbances(self, lower: Array, upper: Array) -> HPolytope | None:
+        polytope = self._normal.disturbance_polytope
+        return HPolytope.box(lower, upper) if polytope is None and lower.size else polytope
+
+    # -- a set that is lost ------------------------------------------------------------------------
+
+    def _begin(self, sample: Sample) -> PolytopeStep:
+        """The first sample of a set."""
+        if not is_of_use(sample, sample.u):
+            return self._lost(sample.u, sample)
+        return self._keep(sample, self._recursion.first(self._initial, sample))
+
+    def _go_on(self, u: Array, sample: Sample) -> PolytopeStep | None:
+        """The next sample, or None if the set has outgrown all bounds."""
+        assert self._last is not None
+        before, last = self._last
+        if not (is_of_use(before, u) and is_of_use(sample, sample.u)):
+            return None
+        size = reach_ahead(self._normal, before, last.joint, u)
+        if not size < LARGEST:
+            return None
+        try:
+            maps = transitions(before.stack, self._normal, u)
+            return self._keep(sample, self._recursion.next(last, before, maps, sample))
+        except (UndecidedError, np.linalg.LinAlgError):
+            if size < FLOATS_TELL_APART:
+                raise
+            return None
+
+    def _give_up(self, u: Array, sample: Sample) -> PolytopeStep:
+        """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
+        largest = self._normal.start_range
+        if largest is None:
+            return self._lost(u, sample)
+        self._initial, self.largest_at = HPolytope.box(largest.lower, largest.upper), sample.number
+        return self._begin(sample)
+
+    def _lost(self, u: Array, sample: Sample) -> PolytopeStep:
+        self._lose()
+        return self._without_set(u, sample)
+
+    def _without_set(self, u: Array, sample: Sample) -> PolytopeStep:
+        """A sample of an observer that has no set: it starts again once the readings alone bound the state."""
+        assert self._readings is not None
+        slack = np.zeros(self._normal.n_outputs)
+        self._readings.add(u, Reading(sample.stack, sample.u, sample.y, sample.noise, slack, *sample.w_box))
+        found = self._readings.start()
+        if found is not None:
+            step = self._start_again(*found)
+            if step is not None:
+                return step
+        joint = anywhere(self._normal.n_states, self._normal.physical_range)
+        return PolytopeStep(joint, self._form, verdict="undecided", reason=OUTGROWN)
+
+    def _start_again(self, samples: list[Reading], lower: Array, upper: Array) -> PolytopeStep | None:
+        """From bounds of the state at the first of some samples; None if a set does not come out of it."""
+        readings = self._readings
+        physical = self._normal.physical_range
+        if physical is not None:
+            lower, upper, _ = physical.cut(lower, upper)
+        self._readings, self._initial = None, HPolytope.box(lower, upper)
+        step = None
+        for j, s in enumerate(samples):
+            disturbances = self._disturbances(s.w_lower, s.w_upper)
+            at, box = self._number - len(samples) + 1 + j, (s.w_lower, s.w_upper)
+            sample = Sample(at, s.stack, disturbances, s.noise, s.u, s.y, box)
+            step = self._begin(sample) if j == 0 else self._go_on(samples[j - 1].u, sample)
+            if step is None or step.reason == OUTGROWN or (step.verdict == "falsified" and j + 1 < len(samples)):
+                # a proof before the last sample would rest on readings that come after it
+                self._readings, self._last = readings, None
+                return None
+        return step
 
 
 def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None:

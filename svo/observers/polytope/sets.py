@@ -11,15 +11,15 @@ import numpy as np
 from polytopes import HPolytope, UndecidedError
 from svo.checks import Array
 from svo.models.model import UncertainModel
-from svo.observers.base import VerdictName
-from svo.observers.polytope.output_rows import output_rows
-from svo.observers.polytope.step import (
+from svo.observers.answers import VerdictName
+from svo.observers.polytope.certificate import (
     AnyCertificate,
     MeasuredOutput,
     PolytopeCertificate,
     PublishedCertificate,
     intersection,
 )
+from svo.observers.polytope.output_rows import output_rows
 from svo.observers.polytope.vertex_images import (
     hull_normals,
     hull_of_images,

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import Certificate, HPolytope
-from svo.observers.base import VerdictName
+from svo.observers.answers import VerdictName
+from svo.observers.polytope.certificate import AnyCertificate, PolytopeCertificate, PublishedCertificate
 from svo.observers.polytope.sets import Outcome, Sample
-from svo.observers.polytope.step import AnyCertificate, PolytopeCertificate, PublishedCertificate
 
 State = dict[str, NDArray]
 VERDICTS: tuple[VerdictName, ...] = ("consistent", "falsified", "undecided")

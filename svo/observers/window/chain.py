@@ -19,10 +19,12 @@ from svo.checks import Array
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers import window_kernel as kernel
-from svo.observers.base import VerdictName
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate, exact
+from svo.observers.answers import VerdictName
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.observer import WindowObserver
 from svo.observers.window.sign_split import SplitCertificate
+from svo.observers.window.weak_duality import exact
 
 
 @dataclass(frozen=True, eq=False)

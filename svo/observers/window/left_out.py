@@ -15,7 +15,6 @@ that are floats leave exactly nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from flint import arb, arb_mat, ctx, fmpq
@@ -24,10 +23,8 @@ from numpy.typing import NDArray
 from polytopes.exact import ZERO, rational
 from svo.checks import Array
 from svo.models.normal_form import Exponents, power
+from svo.observers.window.evidence import WindowEvidence, WindowSample
 from svo.observers.window_kernel import channel_factors
-
-if TYPE_CHECKING:
-    from svo.observers.window.evidence import WindowCertificate, WindowSample
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +74,7 @@ def factors_of(stack: Array, owner: NDArray[np.int64], delta: Array, units: Expo
     return Factors(gains, functionals, tuple((i, j, value) for (i, j), value in entries.items()))
 
 
-def left_out(c: WindowCertificate, factors: list[Factors]) -> list[list[fmpq]]:
+def left_out(c: WindowEvidence, factors: list[Factors]) -> list[list[fmpq]]:
     """Bounds (n + ny,) of what is left out of [x(k+1); y(k)], for every sample of a window."""
     rows = len(c.samples[0].stack[0])
     with ctx.workprec(128 + 4 * len(c.samples)):
@@ -97,7 +94,7 @@ def left_out(c: WindowCertificate, factors: list[Factors]) -> list[list[fmpq]]:
 class _Reach:
     """{centre + generators z : |z| <= 1}, which contains every state that the variables' boxes allow at a sample."""
 
-    def __init__(self, c: WindowCertificate) -> None:
+    def __init__(self, c: WindowEvidence) -> None:
         self._delta, self._n = c.delta, c.n
         ends = [_ball(low, high) for low, high in zip(c.arrival.box_lower, c.arrival.box_upper, strict=True)]
         self._centre = arb_mat(c.n, 1, [middle for middle, _ in ends])

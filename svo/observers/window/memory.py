@@ -12,7 +12,8 @@ from svo.checks import Array
 from svo.models.normal_form import ENORMOUS, NormalForm
 from svo.observers import window_kernel as kernel
 from svo.observers.given_units import window_out
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate, certificate_of
+from svo.observers.window.certificate import WindowCertificate, certificate_of
+from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.output_injection import OutputInjection, can_inject
 from svo.observers.window.setup import (
     channel_owners,
@@ -114,10 +115,6 @@ class WindowMemory:
     def _time(self) -> int:
         """Newest sample, as the kernel counts from the start of its window."""
         return int(self._arrays["clock"][kernel.TIME])
-
-    @property
-    def _started(self) -> bool:
-        return bool(self._arrays["clock"][kernel.STARTED])
 
     def _arrival(self) -> ArrivalSet:
         if self._arrays["clock"][kernel.BASE] == 0:

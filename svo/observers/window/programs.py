@@ -9,18 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from svo.models.normal_form import NormalForm
+from svo.checks import Array
 from svo.observers import window_kernel as kernel
-from svo.observers.base import VerdictName
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate
+from svo.observers.answers import VerdictName
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.fallback import candidates, is_feasible
 from svo.observers.window.memory import WindowMemory
 from svo.observers.window.sign_split import SplitPrograms
 
 _PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
-ENTRY_ERRORS = {
-    kernel.BAD_INPUT: "u is {u}; expected finite numbers",
-    kernel.BAD_OUTPUT: "y is {y}; expected finite numbers, or NaN for a missing sensor",
+_ENTRY_ERRORS = {
     kernel.BAD_MATRIX: "the model's matrices at this schedule contain NaN or Inf; expected finite numbers",
     kernel.RANK_ROSE: "an uncertainty has a higher rank at this sample than at the model's typical schedule",
 }
@@ -30,16 +29,16 @@ class Outgrown(Exception):
     """The newest state has no bounds of use: the window is of no more use either."""
 
 
-def check_numbers(data: tuple[Any, ...], form: NormalForm) -> None:
-    """What the kernel checks of the data of a sample, which are in normal form."""
-    u, u_next, y, stack = data[3:7]
-    for code, holds in (
-        (kernel.BAD_INPUT, np.isfinite(u).all() and np.isfinite(u_next).all()),
-        (kernel.BAD_OUTPUT, not np.isinf(y).any()),
-        (kernel.BAD_MATRIX, np.isfinite(stack).all()),
-    ):
-        if not holds:
-            raise ValueError(ENTRY_ERRORS[code].format(u=u * form.u, y=y * form.y))
+def check_matrices(stack: Array) -> None:
+    """What the kernel checks of a sample's matrices."""
+    if not np.isfinite(stack).all():
+        raise ValueError(_ENTRY_ERRORS[kernel.BAD_MATRIX])
+
+
+def _check_entry(code: int) -> None:
+    """What the kernel says of a sample; u and y have been checked before."""
+    if code in _ENTRY_ERRORS:
+        raise ValueError(_ENTRY_ERRORS[code])
 
 
 def _of_one_layout(data: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -56,7 +55,7 @@ class WindowPrograms(WindowMemory):
             self._enter(data)
             return self._solve(kernel.ARRIVAL)
         code, verdict, program = kernel.take(*_of_one_layout(data), self.eps, kernel.PIVOT_LIMIT)
-        self._check_entry(code, data)
+        _check_entry(code)
         if code == kernel.OUTGROWN:
             raise Outgrown
         if verdict == kernel.CONSISTENT:
@@ -69,7 +68,7 @@ class WindowPrograms(WindowMemory):
         if self._injection is not None:
             data, injected = self._inject(data)
         code = kernel.enter(*_of_one_layout(data))
-        self._check_entry(code, given)
+        _check_entry(code)
         self._settle_channels(code == kernel.SIGN_OPEN, False, end)
         code = kernel.move(*data[:3])
         w, s = self._arrays, self._time % (self._size.N + 1)
@@ -103,10 +102,6 @@ class WindowPrograms(WindowMemory):
         arrays["w_lower"][v, nw:], arrays["w_upper"][v, nw:] = -d, d
         arrays["noise"][s] += widening
         arrays["given.slack"][s] = slack
-
-    def _check_entry(self, code: int, data: tuple[Any, ...]) -> None:
-        if code in ENTRY_ERRORS:
-            raise ValueError(ENTRY_ERRORS[code].format(u=data[3] * self._form.u, y=data[5] * self._form.y))
 
     def _channels(self, reaching: bool) -> list[int]:
         """Those of the newest sample that reach the output, or those that do not."""

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from svo.checks import Array
 from svo.observers import window_kernel as kernel
-from svo.observers.base import VerdictName
+from svo.observers.answers import VerdictName
 from svo.observers.free_start import Reading
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, Readings
 from svo.observers.window.evidence import ArrivalSet
-from svo.observers.window.programs import Outgrown, WindowPrograms, check_numbers
+from svo.observers.window.programs import Outgrown, WindowPrograms, check_matrices
 
 _BLURRED = 1e-3  # of a reading's own width: the share of its slack by the width of the set from which a restart pays
 _LONGEST = 10  # samples without a sensor after which its return may call for one, where the window has no end
@@ -30,6 +30,7 @@ _LONGEST = 10  # samples without a sensor after which its return may call for on
 class RestartingWindow(WindowPrograms):
     """Samples through a window, however long the gaps between their measurements."""
 
+    _number: int
     _reason: str | None
     _readings: Readings | None
     _missing: NDArray[np.int64]
@@ -37,31 +38,19 @@ class RestartingWindow(WindowPrograms):
     def _begin_first(self, initial: ArrivalSet) -> None:
         """Forget everything but a set of first states."""
         self._initial = initial
-        self.largest_at, self._reason, self._lost, self._lost_at, self._readings = None, None, False, -1, None
-        self._schedule: Any = None  # of the newest sample
+        self.largest_at, self._reason, self._lost, self._readings = None, None, False, None
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)
         self._begin(initial, self._first_steps)
-
-    @property
-    def _number(self) -> int:
-        """Of the newest sample."""
-        return self._lost_at if self._lost else self._origin + self._time
-
-    @property
-    def _started(self) -> bool:
-        return self._lost_at >= 0 if self._lost else super()._started
 
     def _answer(self, data: tuple[Any, ...], end: float | None) -> VerdictName:
         """One sample. The observer is unchanged if it raises an error."""
         if self._lost:
-            check_numbers(data, self._form)
-            self._lost_at += 1
+            check_matrices(data[6])
             return self._without_set(data)
-        number = 0 if data[2] else self._number + 1
         try:
             verdict = self._with_set(data, end)
         except Outgrown:
-            return self._give_up(data, number)
+            return self._give_up(data)
         if verdict != "falsified":
             verdict = self._watch(data, verdict)
         return verdict
@@ -93,7 +82,7 @@ class RestartingWindow(WindowPrograms):
         """First sample that is still at hand."""
         if self._lost:
             assert self._readings is not None
-            return self._lost_at - len(self._readings.samples) + 1
+            return self._number - len(self._readings.samples) + 1
         return self._origin + int(self._arrays["clock"][kernel.BASE])
 
     def _read_at(self, sample: int) -> Array:
@@ -119,35 +108,31 @@ class RestartingWindow(WindowPrograms):
 
     # -- the set is gone ---------------------------------------------------------------------------
 
-    def _give_up(self, data: tuple[Any, ...], number: int) -> VerdictName:
+    def _give_up(self, data: tuple[Any, ...]) -> VerdictName:
         """The set has outgrown all bounds at this sample."""
         largest = self._normal.start_range
         if largest is not None:
-            self._start(ArrivalSet.box(largest.lower, largest.upper), number)
-            self.largest_at = number
+            self._start(ArrivalSet.box(largest.lower, largest.upper), self._number)
+            self.largest_at = self._number
             self._missing[:] = self._horizon_of_gaps
             try:
                 return self._with_set((self._window, self._size, True, *data[3:]), None)
             except Outgrown:
                 pass  # it is itself beyond all bounds
-        self._lose(number)
+        self._lose()
         return self._without_set(data)
 
-    def lose_set(self) -> None:
-        """Forget all data; nothing is known of the state at the next measurement.
-
-        The observer starts from the model's largest set, or is undecided until the readings alone bound the state.
-        """
+    def _lose_set(self) -> None:
         largest = self._normal.start_range
         if largest is None:
-            self._lose(-1)
+            self._lose()
         else:
             self._begin_first(ArrivalSet.box(largest.lower, largest.upper))
             self.largest_at, self._missing[:] = 0, self._horizon_of_gaps
 
-    def _lose(self, number: int) -> None:
-        """There is no set any more; ``number`` is that of the newest sample."""
-        self.largest_at, self._lost, self._lost_at = None, True, number
+    def _lose(self) -> None:
+        """There is no set any more."""
+        self.largest_at, self._lost = None, True
         self._readings = Readings(self._normal, self.eps, self.horizon or 0)
         self._begin(self._anchor, self._first_steps)
 
@@ -201,11 +186,11 @@ class RestartingWindow(WindowPrograms):
         if found is None:
             return None
         samples, lower, upper = found
-        number, kept = self._number, self.__dict__.copy()
+        kept = self.__dict__.copy()
         physical = self._normal.physical_range
         if physical is not None:
             lower, upper, _ = physical.cut(lower, upper)
-        self._start(ArrivalSet.box(lower, upper), number - len(samples) + 1, free=True)
+        self._start(ArrivalSet.box(lower, upper), self._number - len(samples) + 1, free=True)
         try:
             verdict = self._repeat(samples)
         except Outgrown:
@@ -265,12 +250,12 @@ class RestartingWindow(WindowPrograms):
     def _restart_state(self) -> dict[str, Array]:
         """What the next samples depend on besides the kernel's memory."""
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
-        lost_at = self._lost_at if self._lost else -1
+        lost_at = self._number if self._lost else -1
         numbers = [self._origin, self._free, self._lost, lost_at, largest, self._readings is not None]
         state: dict[str, Any] = {"restart": np.array(numbers, dtype=np.int64), "missing": self._missing}
         state |= {f"anchor.{f.name}": getattr(self._anchor, f.name) for f in fields(ArrivalSet)}
         if self._readings is not None:
-            state |= {f"readings.{name}": value for name, value in self._readings.state().items()}
+            state |= self._readings.state()
         return state
 
     def _restore_restart(self, state: Mapping[str, Array], steps: int) -> None:
@@ -278,13 +263,12 @@ class RestartingWindow(WindowPrograms):
         origin, free, lost, lost_at, largest, has_readings = (int(v) for v in state["restart"])
         anchor = ArrivalSet(**{f.name: np.array(state[f"anchor.{f.name}"]) for f in fields(ArrivalSet)})
         self._begin(anchor, steps, origin, bool(free))
-        self._lost, self._lost_at = bool(lost), lost_at
+        self._lost, self._number = bool(lost), lost_at
         self.largest_at = None if largest == NO_SAMPLE else largest
         self._missing = np.array(state["missing"], dtype=np.int64)
         if has_readings:
             self._readings = Readings(self._normal, self.eps, self.horizon or 0)
-            prefix = "readings."
-            self._readings.restore({k.removeprefix(prefix): state[k] for k in state if k.startswith(prefix)})
+            self._readings.restore(state)
 
 
 def _reading_of(data: tuple[Any, ...]) -> Reading:

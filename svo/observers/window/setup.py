@@ -10,7 +10,6 @@ from svo.checks import Array, real_array
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
 from svo.models.stack import may_be_nonzero
-from svo.models.state_range import StateRange
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window_kernel import channel_count
 
@@ -69,40 +68,6 @@ def disturbance_rows(form: NormalForm) -> tuple[Array, Array, Array]:
     return rows * form.w, lower, upper
 
 
-def check_first_states(P: HPolytope, n: int) -> None:
-    """Raise an error unless a set of first states is one, of n states, and not empty."""
-    if not isinstance(P, HPolytope):
-        raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
-    if P.dim != n:
-        raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
-    if P.emptiness().status != "nonempty":
-        raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
-
-
-def within(physical: StateRange | None, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Bounds of a set of first states, cut to the physical range."""
-    if physical is None:
-        return lower, upper
-    lower, upper, meets = physical.cut(lower, upper)
-    if not meets:
-        raise ValueError("initial and the model's physical range have no common point; expected first states within it")
-    return lower, upper
-
-
-def first_states(P: HPolytope, model: UncertainModel) -> ArrivalSet:
-    """A set of first states of a model: its box, within the physical range, and its rows on several states."""
-    return ArrivalSet(*within(model.physical_range, *finite_box(P, model.n_states)), *joint_rows(P))
-
-
-def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
-    """Bounds of a set of first states, rounded outward where they had to be computed."""
-    check_first_states(P, n)
-    lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
-    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        raise ValueError(
-            "initial is unbounded; expected a bounded set of first states, such as a box as large as they can be: "
-            "the measurements shrink it"
-        )
-    given = len(P.C) == 0 and np.isin(P.A, (-1.0, 0.0, 1.0)).all() and (np.count_nonzero(P.A, axis=1) == 1).all()
-    room = 0.0 if given else 1e-12 * np.maximum(np.abs(lower), np.abs(upper))
-    return lower - room, upper + room
+def arrival_of(P: HPolytope, lower: Array, upper: Array) -> ArrivalSet:
+    """A set of first states: its box, and its rows on several states."""
+    return ArrivalSet(lower, upper, *joint_rows(P))

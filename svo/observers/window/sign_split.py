@@ -16,8 +16,12 @@ from typing import Any
 import numpy as np
 
 from svo.checks import Array
+from svo.logs.log import Log
+from svo.models.digest import ModelSample
 from svo.observers import window_kernel as kernel
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate, WindowSample
+from svo.observers.certificate import Certificate
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet, WindowSample
 
 Cell = dict[tuple[int, int], tuple[float, float]]  # (sample, channel): bounds of its s
 _CHANGED = ("G", "GT", "row_x", "row_v", "row_c", "raw_lower", "raw_upper", "scale", "magnitude", "lower", "upper",
@@ -26,7 +30,7 @@ _INEXACT = 1e-9  # of the half-width of p, by which p may miss Delta s
 
 
 @dataclass(frozen=True, eq=False)
-class SplitCertificate:
+class SplitCertificate(Certificate):
     """Proof that a window is empty whatever the signs of its s: one certificate a cell, and the cells cover all.
 
     Attributes
@@ -36,6 +40,8 @@ class SplitCertificate:
     s_lower, s_upper : (samples, nq) arrays
         Bounds of every s that the cells must cover; conditional as in `WindowCertificate`.
     """
+
+    kind = "window split by signs"
 
     cells: tuple[WindowCertificate, ...]
     s_lower: Array
@@ -70,6 +76,16 @@ class SplitCertificate:
         if self.s_lower.shape != shape or self.s_upper.shape != shape:
             return False
         return _cover(self.s_lower, self.s_upper, boxes)
+
+    def premise(self, sample: int) -> str:
+        return self.cells[0].premise(sample)
+
+    def model_data(self) -> tuple[ModelSample, ...]:
+        return self.cells[0].model_data()
+
+    def difference(self, last: int, log: Log) -> str | None:
+        """As of every certificate; `verify` holds the cells against each other."""
+        return self.cells[0].difference(last, log)
 
 
 def _same_window(a: WindowCertificate, b: WindowCertificate) -> bool:

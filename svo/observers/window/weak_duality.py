@@ -12,16 +12,12 @@ direction at one sample subtracted, the same sum bounds that direction over the 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from flint import fmpq
 
 from svo.checks import Array
+from svo.observers.window.evidence import WindowEvidence, WindowSample
 from svo.observers.window.left_out import Factors, factors_of, left_out
-
-if TYPE_CHECKING:
-    from svo.observers.window.evidence import WindowCertificate, WindowSample
 
 ZERO = fmpq(0)
 
@@ -48,7 +44,7 @@ class DualSum:
         From `gap`, where a multiplier, a line or a factor is not what the rows need.
     """
 
-    def __init__(self, certificate: WindowCertificate, objective: tuple[int, Array] | None = None) -> None:
+    def __init__(self, certificate: WindowEvidence, objective: tuple[int, Array] | None = None) -> None:
         self.c = certificate
         self.objective = objective  # sample of the window and direction of what is subtracted from the rows
         self.total = ZERO  # lower bound of (multiplied rows - multiplied bounds) over the boxes

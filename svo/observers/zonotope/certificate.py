@@ -15,12 +15,16 @@ from flint import fmpq
 
 from polytopes.exact import ZERO, rational
 from svo.checks import Array
-from svo.observers.window.evidence import WindowCertificate
+from svo.logs.log import Log
+from svo.models.digest import ModelSample
+from svo.observers.certificate import Certificate
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import WindowSample
 from svo.observers.zonotope.zonotope import ConstrainedZonotope
 
 
 @dataclass(frozen=True, eq=False)
-class ZonotopeCertificate:
+class ZonotopeCertificate(Certificate):
     """Proof that no state of a constrained zonotope explains the measurements of the last two samples.
 
     Conditional, as that of a window: on the arrival set, which was computed in floats and rounded outward, and on the
@@ -36,6 +40,8 @@ class ZonotopeCertificate:
         Its arrival set is one half-space, and the interval hull of the zonotope.
     """
 
+    kind = "constrained zonotope"
+
     arrival: ConstrainedZonotope
     multipliers: Array
     window: WindowCertificate
@@ -45,11 +51,15 @@ class ZonotopeCertificate:
         """Sample of the falsification."""
         return self.window.last
 
+    @property
+    def samples(self) -> tuple[WindowSample, ...]:
+        """Those of the window."""
+        return self.window.samples
+
     def verify(self) -> bool:
         """Whether the proof holds in exact rational arithmetic.
 
-        False, and no error, for arrays of wrong shapes, for NaN or Inf and for a negative room or slack: a stored
-        certificate may hold anything.
+        False, and no error, also for a negative room or slack.
         """
         known, Z = self.window.arrival, self.arrival
         if not self.window.verify() or not self._is_well_formed():
@@ -64,6 +74,15 @@ class ZonotopeCertificate:
         ]
         rows = [(known.rows[0], known.upper[0], self.multipliers), *hull]
         return all(proven_support(Z, d, mu) <= rational(h) for d, h, mu in rows)
+
+    def premise(self, sample: int) -> str:
+        return self.window.premise(sample)
+
+    def model_data(self) -> tuple[ModelSample, ...]:
+        return self.window.model_data()
+
+    def difference(self, last: int, log: Log) -> str | None:
+        return self.window.difference(last, log)
 
     def _is_well_formed(self) -> bool:
         Z, n = self.arrival, self.window.n

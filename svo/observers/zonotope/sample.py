@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from svo.checks import Array
 from svo.models.normal_form import NormalForm
 from svo.observers.given_units import zonotope_proof_out
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate, WindowSample
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet, WindowSample
 from svo.observers.window.setup import channel_owners, disturbance_rows, output_is_disturbed
 from svo.observers.window_kernel import channel_factors
 from svo.observers.zonotope.certificate import ZonotopeCertificate, proven_support, rounded_up

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_observers import FakeModel, FakeObserver, fake, log_of
+from fake_observers import FakeObserver, FakeProof, fake, fake_model, log_of
 
 from polytopes import HPolytope
 from svo.isolation.architectures import ArchitectureII
@@ -52,7 +52,7 @@ def test_a_class_two_model_can_fall_at_the_sample_of_the_detection() -> None:
     b.update([0.0])
     detected = b.step([1.0], [1.0])
     assert (detected.state, detected.alive) == ("detected", ("a", "b"))
-    assert detected.steps["c"].certificate == ("proof", 1.0)
+    assert detected.steps["c"].certificate == FakeProof(1.0)
     record = bank().run(log_of(0.0, 1.0, 2.0, 3.0))
     assert record.died_at == {"nominal": 1, "a": 2, "b": 3, "c": None}
     one_left = bank()
@@ -60,7 +60,7 @@ def test_a_class_two_model_can_fall_at_the_sample_of_the_detection() -> None:
     record = one_left.run(log_of(0.0, 1.0, 0.0))
     assert (record.detected_at, record.isolated_at, record.fault) == (1, 1, "b")
     assert record.died_at["c"] == 1
-    assert record.certificates["c"] == ("proof", 1.0)
+    assert record.certificates["c"] == FakeProof(1.0)
 
 
 def test_a_detection_at_the_first_sample() -> None:
@@ -74,12 +74,12 @@ def test_a_falsified_global_observer_is_a_result_with_its_certificate() -> None:
     b.update([0.0])
     verdict = b.step([1.0], [5.0])
     assert (verdict.state, verdict.alive, verdict.fault, verdict.detected_at) == ("unexplained", (), None, 1)
-    assert verdict.steps["global"].certificate == ("proof", (5.0, 9.0))
+    assert verdict.steps["global"].certificate == FakeProof((5.0, 9.0))
     assert b.step([1.0], [0.0]).steps == {}
     record = bank().run(log_of(0.0, 0.0, 5.0, 0.0))
     assert record.states == ("nominal", "nominal", "unexplained", "unexplained")
     assert record.died_at["global"] == 2
-    assert record.certificates["global"] == ("proof", (5.0, 9.0))
+    assert record.certificates["global"] == FakeProof((5.0, 9.0))
     assert record.names == ("nominal", "a", "b", "c")
     np.testing.assert_array_equal(np.isnan(record.global_seconds), [False, False, False, True])
 
@@ -214,7 +214,7 @@ def two(**options: Any) -> ArchitectureII:
         ({"global_": HPolytope.box([0.0, 0.0], [1.0, 1.0])}, "global_ has dimension 2; expected 1"),
         ({"global_": HPolytope.empty(1)}, "global_ is empty or unbounded"),
         ({"global_": HPolytope.box([0.0], [np.inf])}, "global_ is empty or unbounded"),
-        ({"global_": FakeObserver(5.0, model=FakeModel(n_states=2))}, "'global' has n_states = 2; expected 1"),
+        ({"global_": FakeObserver(5.0, model=fake_model(n_states=2))}, "'global' has n_states = 2; expected 1"),
         ({"global_": SET, "debounce": 0}, "debounce is 0; expected a number of samples >= 1"),
     ],
 )

@@ -108,7 +108,7 @@ def test_the_state_of_another_bank_is_refused_and_changes_nothing() -> None:
 
 
 def test_an_observer_without_a_state_is_named() -> None:
-    bank = ArchitectureI(FakeObserver(7.0), {"a": FakeObserver(8.0)})  # type: ignore[arg-type]
+    bank = ArchitectureI(FakeObserver(7.0), {"a": FakeObserver(8.0)})
     with pytest.raises(TypeError, match=r"observer 'nominal' \(FakeObserver\) has no state_dict"):
         bank.state_dict()
 
@@ -150,22 +150,24 @@ def test_a_long_deadline_changes_nothing_but_the_portions_of_the_programs() -> N
 class Clocked(FakeObserver):
     """Takes what it is told to, and notes the share that it was given."""
 
+    takes_deadline = True
+
     def __init__(self, seconds: float) -> None:
         super().__init__(1e9)
         self.seconds, self.shares = seconds, list[float]()
 
-    def step(self, u: Any, y: Any, u_next: Any = None, schedule: Any = None, deadline: float | None = None) -> Any:
-        assert deadline is not None
-        self.shares.append(deadline)
-        end = perf_counter() + min(self.seconds, deadline)
+    def _step(self, u: Any, y: Any, u_next: Any, schedule: Any, end: float | None) -> Any:
+        assert end is not None
+        self.shares.append(end - perf_counter())
+        end = min(perf_counter() + self.seconds, end)
         while perf_counter() < end:
             pass
-        return super().step(u, y, u_next, schedule)
+        return super()._step(u, y, u_next, schedule, end)
 
 
 def test_each_observer_has_an_equal_share_of_what_is_left() -> None:
     quick, slow, last = Clocked(0.0), Clocked(1.0), Clocked(0.0)
-    bank = ArchitectureI(quick, {"slow": slow, "last": last})  # type: ignore[arg-type]
+    bank = ArchitectureI(quick, {"slow": slow, "last": last})
     bank.update([0.0])
     begun = perf_counter()
     bank.step([0.0], [0.0], deadline=0.06)
@@ -176,7 +178,7 @@ def test_each_observer_has_an_equal_share_of_what_is_left() -> None:
 
 
 def test_an_observer_without_a_deadline_is_refused_by_name() -> None:
-    bank = ArchitectureI(Clocked(0.0), {"leak": FakeObserver(8.0)})  # type: ignore[arg-type]
+    bank = ArchitectureI(Clocked(0.0), {"leak": FakeObserver(8.0)})
     bank.update([0.0])
     with pytest.raises(ValueError, match=r"the step of observer 'leak' \(FakeObserver\) has none"):
         bank.step([0.0], [0.0], deadline=0.1)

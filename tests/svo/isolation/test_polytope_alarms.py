@@ -15,8 +15,7 @@ import pytest
 from polytopes import HPolytope
 from svo import ArchitectureI, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
 from svo.detection.detect import alarms_of
-from svo.isolation.alarm_kinds import kind_of
-from svo.isolation.alarms import Alarm, read_alarms, verify_alarms, write_alarms
+from svo.isolation.alarms import Alarm, alarm_line, read_alarms, verify_alarms, write_alarms
 from svo.logs.log import Log
 
 CART = UncertainModel(
@@ -157,4 +156,4 @@ def test_what_proves_nothing_of_the_model_is_not_stored() -> None:
         observer = PolytopeObserver(CART, X0, max_facets=24, as_published=True)
     record = observer.run(log)
     with pytest.raises(TypeError, match="PublishedCertificate, which no alarm can store"):
-        kind_of(record.certificate)
+        alarm_line(Alarm("cart", 12, 1.2, record.certificate, {}))

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo.models.model import UncertainModel, Uncertainty
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.observer import WindowObserver
 from tests.svo.observers.random_plants import random_plant
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 from polytopes import HPolytope
 from svo.models.model import UncertainModel, Uncertainty
-from svo.observers.window.evidence import WindowCertificate
+from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.left_out import factors_of
 from svo.observers.window.observer import WindowObserver
 from tests.svo.observers.falsified_windows import (

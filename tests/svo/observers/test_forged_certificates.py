@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from svo.observers.window.evidence import ArrivalSet, WindowCertificate, WindowSample
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet, WindowSample
 from tests.svo.observers.falsified_windows import (
     Forgery,
     arrays_of,

@@ -22,7 +22,6 @@ from svo import (
     prove_chain,
 )
 from svo.faults import ActuatorFault, SensorFault, Step, pairs
-from svo.isolation.alarm_kinds import WINDOW
 from svo.logs.log import Log
 from tests.svo.observers.window_system import judge
 
@@ -248,7 +247,7 @@ def test_an_alarm_without_it_is_proven_from_the_first_sample_on(seed: int) -> No
     assert chain.proven == (record.certificate is not None)
     if record.certificate is not None:
         assert judge(record.certificate) == "empty"
-        assert WINDOW.difference(record.certificate, record.certificate.last, bad) is None
+        assert record.certificate.difference(record.certificate.last, bad) is None
 
 
 @pytest.mark.parametrize("name", ["B_i and C_i", "B_i and c_i"])
@@ -257,9 +256,9 @@ def test_the_newest_input_of_an_alarm_is_that_of_the_log_where_it_takes_part(nam
     log = Log(np.arange(3.0), np.array([[0.1], [0.2], [0.3]]), np.array([[0.0], [0.1], [9.0]]))
     certificate = observer.run(log).certificate
     assert certificate is not None
-    assert WINDOW.difference(certificate, 2, log) is None
+    assert certificate.difference(2, log) is None
     forged = replace(certificate, samples=(*certificate.samples[:2], replace(certificate.samples[2], u=np.ones(1))))
-    assert "u of sample 2" in str(WINDOW.difference(forged, 2, log))
+    assert "u of sample 2" in str(forged.difference(2, log))
 
 
 # -- banks -------------------------------------------------------------------------------------------------------

@@ -15,7 +15,8 @@ from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.logs.drive import drive
 from svo.models.normal_form import NormalForm
 from svo.observers.polytope.observer import PolytopeObserver
-from svo.observers.window.evidence import WindowCertificate, WindowSample
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import WindowSample
 from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
 from tests.svo.observers.falsified_windows import corrupted, varied_plant
 from tests.svo.observers.other_units import Units

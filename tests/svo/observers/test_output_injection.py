@@ -187,7 +187,7 @@ def test_what_was_missing_may_still_come() -> None:
     observer.update(log.y[0], log.u[0])
     for k in range(1, 6):
         observer.step(log.u[k - 1], hole if k == 4 else log.y[k], log.u[k])
-    before = np.ptp(observer._bounds_at(5), axis=0)
+    before = np.ptp(observer.bounds_at(5), axis=0)
     step = observer.late_update(log.y[4], 4)
     assert step.verdict == "consistent"
     assert (np.ptp(step.box, axis=0) <= before * (1 + 1e-6)).all()

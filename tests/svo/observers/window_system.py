@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from svo.observers.window.evidence import WindowCertificate, WindowSample
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import WindowSample
 from svo.observers.window.left_out import factors_of
 
 Array = NDArray[np.float64]

@@ -14,6 +14,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.live_view import follow
+from svo import ConstrainedZonotopeObserver, PolytopeObserver, WindowObserver
 from svo.cli import app
 from svo.detection.detect import detect
 from svo.detection.watch.follow import FileLines
@@ -64,6 +65,18 @@ def test_a_model_that_recovered_can_be_falsified_again(tmp_path: Path) -> None:
     assert status is not None
     assert (status.verdict.state, dict(status.dead)) == ("nominal", {})
     assert all(alarm.certificate.verify() for alarm in alarms)
+
+
+@pytest.mark.parametrize("kind", [WindowObserver, PolytopeObserver, ConstrainedZonotopeObserver])
+def test_a_watch_goes_on_after_an_alarm_of_every_kind_of_observer(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    plant, screen, kept = read_description(CART), io.StringIO(), list[Alarm]()
+    monkeypatch.setattr(type(plant), "_observer", lambda self, model: kind(model, self.initial))
+    session, lines = Session(plant, "stated", "log.csv"), FileLines(LOG, until_end=True)
+    watch(lines, session, PlainView(Console(file=screen, width=200), session), keep=kept.append, save=session.state)
+    said = re.findall(r"its certificate over samples? ([0-9 to]+) (holds|DOES NOT)", screen.getvalue())
+    assert [holds for _, holds in said] == ["holds"] * 2
+    assert {window.split()[-1] for window, _ in said} == {str(alarm.sample) for alarm in kept}
+    assert session.samples == 80
 
 
 def test_the_bounds_are_those_of_the_observer_and_hold_the_true_state() -> None:

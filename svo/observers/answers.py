@@ -1,0 +1,112 @@
+"""What an observer answers: at a sample, and over a log."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polytopes import HPolytope
+from svo.checks import Array
+from svo.observers.certificate import Certificate
+from svo.observers.data import directions_of
+
+VerdictName = Literal["consistent", "falsified", "undecided"]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Step(ABC):
+    """The answer of an observer at one sample; a frozen dataclass.
+
+    A kind of its own defines `n` and `_box`, and `_set` or `_support` where it knows more than a box.
+
+    Attributes
+    ----------
+    verdict : {"consistent", "falsified", "undecided"}
+        "falsified" only with a certificate that has been checked in exact arithmetic.
+    certificate : Certificate or None
+        Proof of the falsification.
+    reason : str or None
+        Why a verdict is "undecided", where it is known: "outgrown" (the set has grown beyond all bounds of use in a gap
+        of the measurements, and what came back does not yet bound the state), "outside the physical range" (of all that
+        the data allow, without a proof), "a reading is too large" (for a polytope, which then goes on without it).
+    sample : int
+        Counted from the first measurement, which is 0; the observer fills it in. After a falsification it is that of
+        the falsification until the observer is reset.
+    seconds : float
+        Wall time of the call; the observer fills it in.
+    """
+
+    verdict: VerdictName
+    certificate: Certificate | None = None
+    reason: str | None = None
+    sample: int = 0
+    seconds: float = 0.0
+
+    @property
+    @abstractmethod
+    def n(self) -> int:
+        """Number of states."""
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """Outer bounds (lower, upper), each (n,), of the state at this sample.
+
+        Infinite while the set is outgrown, NaN once the model is falsified.
+        """
+        if self.verdict == "falsified":
+            return np.full(self.n, np.nan), np.full(self.n, np.nan)
+        return self._box()
+
+    @property
+    def set(self) -> HPolytope:
+        """Contains the state at this sample; empty once the model is falsified."""
+        return HPolytope.empty(self.n) if self.verdict == "falsified" else self._set()
+
+    def support(self, directions: ArrayLike) -> Array:
+        """Outer bounds of d'x over the states at this sample, in any directions.
+
+        Parameters
+        ----------
+        directions : (k, n) array
+
+        Returns
+        -------
+        (k,) array
+            -inf once the model is falsified.
+        """
+        rows = directions_of(directions, self.n)
+        return np.full(len(rows), -np.inf) if self.verdict == "falsified" else self._support(rows)
+
+    @abstractmethod
+    def _box(self) -> tuple[Array, Array]:
+        """As `box`, of a model that is not falsified."""
+
+    def _set(self) -> HPolytope:
+        """As `set`, of a model that is not falsified; the box, unless a kind knows better."""
+        return between(np.eye(self.n), *self._box())
+
+    def _support(self, rows: Array) -> Array:
+        """As `support`, of a model that is not falsified; that of `_set`, unless a kind knows better."""
+        return np.asarray(self._set().support(rows), dtype=np.float64)
+
+
+def between(rows: Array, lower: Array, upper: Array) -> HPolytope:
+    """{x : lower <= rows x <= upper}, without the bounds that are infinite."""
+    bounds = np.concatenate([upper, -lower])
+    known = np.isfinite(bounds)
+    return HPolytope(np.vstack([rows, -rows])[known], bounds[known])
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified."""
+
+    verdicts: tuple[VerdictName, ...]
+    lower: Array
+    upper: Array
+    seconds: Array
+    certificate: Certificate | None
