@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from svo.checks import Array, real_array
 
+__all__ = ["DetectionIndices", "FirstAlarm", "detection_indices", "first_true", "isolation_indices", "judge_alarm"]
+
 
 @dataclass(frozen=True)
 class DetectionIndices:

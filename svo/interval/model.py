@@ -35,12 +35,12 @@ class _Entry:
         return np.reshape(self.formula(*schedule.T), (len(schedule), *self.shape))
 
 
-def first_order_model(noise: float, Ts: float) -> UncertainModel:
+def first_order_model(n: float, Ts: float) -> UncertainModel:
     """The uncertain model of x+ = g x + (1 - g) h u, y = x + noise, scheduled by the bounds of g and h.
 
     Parameters
     ----------
-    noise : float
+    n : float
         Half-width of the measurement noise. A set-valued observer needs one; the interval detector does not.
     Ts : float
         Sampling time [s].
@@ -56,7 +56,7 @@ def first_order_model(noise: float, Ts: float) -> UncertainModel:
         C=[[1.0]],
         E=[[1.0]],
         w=(_Entry(lambda gc, gr, hc, spread: -spread), _Entry(lambda gc, gr, hc, spread: spread)),
-        n=noise,
+        n=n,
         Ts=Ts,
         uncertainties=[
             Uncertainty(
