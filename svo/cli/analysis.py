@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated
@@ -9,8 +10,28 @@ from typing import Annotated
 import typer
 
 from svo.cli.destinations import writable_csv, writable_folder
-from svo.cli.frame import KEPT, PREPARING, announce, app, chosen_noise, one_line_errors, plant_to_simulate
-from svo.cli.options import AsJson, FaultSize, FlightSeed, NoiseName, PlantName, finite
+from svo.cli.frame import (
+    KEPT,
+    PREPARING,
+    announce,
+    app,
+    chosen_noise,
+    one_line_errors,
+    plant_to_simulate,
+    tell_failures,
+)
+from svo.cli.options import (
+    AsJson,
+    FaultSize,
+    FlightSeed,
+    Limit,
+    NoiseName,
+    PlantName,
+    RetryFailed,
+    Scheduler,
+    finite,
+    own_processes,
+)
 from svo.cli.output import print_isolability, print_json
 
 
@@ -124,12 +145,16 @@ def compare(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same comparison in DIR after an interruption.")
     ] = False,
+    retry_failed: RetryFailed = False,
+    scheduler: Scheduler = None,
+    limit: Limit = None,
     as_json: AsJson = False,
 ) -> None:
     """Set detectors side by side: the same runs, the same optimiser, the same false-alarm rate, other seeds to judge.
 
     Every detector is tuned on training runs, under bounded and under Gaussian noise, and judged on runs of other
-    seeds. Prints the median delays; the table has the rest.
+    seeds. Prints the median delays; the table has the rest. What fails is a row with its error; the comparison goes on,
+    and the exit code is 1.
 
     \b
     Example:
@@ -154,10 +179,21 @@ def compare(
             comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
         announce(PREPARING)
         with progress("Parts") as update:
-            compared = run_comparison(comparison, workers, update, out=out, resume=resume)
+            compared = run_comparison(
+                comparison,
+                workers,
+                update,
+                out=out,
+                scheduler=scheduler,
+                limit=own_processes(limit, scheduler, math.inf),
+                resume=resume,
+                retry_failed=retry_failed,
+            )
         rows = publish_comparison(out, compared, the_plant)
         if as_json:
             print_json([row.to_dict() for row in rows])
         else:
             typer.echo(to_text(rows))
             typer.echo(f"Table: {out / 'comparison.csv'}; picture: {out / 'comparison.png'}")
+        failed = compared.failures()
+    tell_failures(failed, "runs of detectors")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+_SHOWN = 10  # failures
 KEPT = "interrupted; what is done is kept, and the same command with --resume goes on"
 PREPARING = "Preparing compiled code (about a minute the first time, then kept)"
 
@@ -82,6 +83,19 @@ def _notes_in_lines() -> Iterator[None]:
 def note(text: str) -> None:
     """One line on standard error, beside the results."""
     typer.echo(f"note: {line(text)}", err=True)
+
+
+def tell_failures(lines: Sequence[str], what: str) -> None:
+    """Name what failed in a study that went on, and end with exit code 1; nothing if nothing did."""
+    if not lines:
+        return
+    for text in lines[:_SHOWN]:
+        typer.echo(f"error: {line(text)}", err=True)
+    more = f" ({len(lines) - _SHOWN} more of them are not shown)" if len(lines) > _SHOWN else ""
+    fail(
+        f"{len(lines)} {what} failed{more}; all others are done and in the results. The same command with --resume "
+        "--retry-failed tries them again"
+    )
 
 
 def fail(message: str, code: int = 1) -> None:

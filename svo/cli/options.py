@@ -16,6 +16,11 @@ def finite(value: float) -> float:
     return value
 
 
+def own_processes(limit: float | None, scheduler: str | None, otherwise: float) -> float | None:
+    """A limit of time, with which work here is done in processes of its own; a cluster has none unless it is asked."""
+    return limit if limit is not None or scheduler is not None else otherwise
+
+
 def positive(value: float | None) -> float | None:
     """A finite number > 0, or none."""
     if value is not None and not (math.isfinite(value) and value > 0):
@@ -31,6 +36,17 @@ LogFile = Annotated[
 ]
 PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered plant; `svo plants` lists them.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Run on the dask.distributed cluster of this scheduler instead."),
+]
+Limit = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SECONDS", callback=positive, help="Stop what takes longer: it has failed, and the rest goes on."
+    ),
+]
+RetryFailed = Annotated[bool, typer.Option("--retry-failed", help="With --resume: try again what failed.")]
 NoiseName = Annotated[
     str | None, typer.Option(metavar="NAME", help="Noise set: the bounds assumed. [default: the plant's first]")
 ]

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
 from svo.cli.destinations import writable_folder, writable_log
-from svo.cli.frame import KEPT, PREPARING, announce, app, chosen_noise, note, one_line_errors, plant_to_simulate
-from svo.cli.options import AsJson, NoiseName, PlantName
+from svo.cli.frame import (
+    KEPT,
+    PREPARING,
+    announce,
+    app,
+    chosen_noise,
+    note,
+    one_line_errors,
+    plant_to_simulate,
+    tell_failures,
+)
+from svo.cli.options import AsJson, Limit, NoiseName, PlantName, RetryFailed, Scheduler, own_processes
 from svo.cli.output import describe, print_detector_study, print_json, print_study
 
-if TYPE_CHECKING:
-    from svo.studies.configuration import StudyConfiguration
-    from svo.studies.thresholds import LearnsDetectors
+_LIMIT = 3600.0  # s that a run may take, unless it is asked for
 
 
 @app.command()
@@ -69,10 +77,8 @@ def study(
             metavar="NAME", help="Fault, or none for fault-free runs; may be repeated. [default: all and none]"
         ),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Run on the dask.distributed cluster of this scheduler instead."),
-    ] = None,
+    scheduler: Scheduler = None,
+    limit: Limit = None,
     architecture: Annotated[
         list[str] | None,
         typer.Option(
@@ -82,12 +88,14 @@ def study(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
     ] = False,
+    retry_failed: RetryFailed = False,
     as_json: AsJson = False,
 ) -> None:
     """Measure times to detect and to isolate over many simulated runs.
 
     Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html. A plant with
-    interval detectors (elevator) is studied with these, each learnt anew in every run.
+    interval detectors (elevator) is studied with these, each learnt anew in every run. A run that fails is a row with
+    its error; the study goes on, and the exit code is 1.
 
     \b
     Example:
@@ -99,10 +107,10 @@ def study(
         _need_study_extra()
         from svo.cli.progress import progress
         from svo.studies.configuration import StudyConfiguration
-        from svo.studies.isolation.publish import publish
-        from svo.studies.isolation.runner import run_study, warm_up
+        from svo.studies.isolation.runner import run_study
         from svo.studies.isolation.store import StudyFolder
-        from svo.studies.thresholds import LearnsDetectors
+        from svo.studies.runs import failures
+        from svo.studies.thresholds import LearnsDetectors, run_detection_study
 
         the_plant = plant_to_simulate(plant)
         configuration = StudyConfiguration.for_plant(
@@ -110,22 +118,27 @@ def study(
         )
         for line in StudyFolder(out).check(configuration, resume):
             note(line)
-        if isinstance(the_plant, LearnsDetectors):
-            _study_detectors(the_plant, configuration, out, workers, scheduler, resume, as_json)
-            return
+        learns = isinstance(the_plant, LearnsDetectors)
+        run = run_detection_study if learns else run_study
         announce(PREPARING)
-        warm_up(the_plant, configuration.noise[0])
         with progress("Runs") as update:
-            folder = run_study(configuration, out, workers=workers, scheduler=scheduler, resume=resume, progress=update)
+            folder = run(
+                configuration,
+                out,
+                workers=workers,
+                scheduler=scheduler,
+                limit=own_processes(limit, scheduler, _LIMIT),
+                resume=resume,
+                retry_failed=retry_failed,
+                progress=update,
+            )
         announce("Writing summary, pictures and report")
-        summaries = publish(folder, the_plant)
-        if as_json:
-            from svo.studies.isolation.summary import to_json
-
-            print_json({"configuration": configuration.to_dict(), "summary": to_json(summaries)})
-        else:
-            print_study(the_plant, summaries)
+        shown = _detector_study if learns else _isolation_study
+        shown(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
+        if not as_json:
             typer.echo(f"Report: {out / 'report.html'}")
+        failed = failures(folder.rows())
+    tell_failures(failed, "runs")
 
 
 @app.command()
@@ -207,29 +220,25 @@ def simulate(
         typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
 
 
-def _study_detectors(
-    the_plant: LearnsDetectors,
-    configuration: StudyConfiguration,
-    out: Path,
-    workers: int,
-    scheduler: str | None,
-    resume: bool,
-    as_json: bool,
-) -> None:
-    from svo.cli.progress import progress
-    from svo.studies.thresholds import publish, run_detection_study
+def _isolation_study(folder: Any, plant: Any, json: dict[str, Any] | None) -> None:
+    from svo.studies.isolation.publish import publish
+    from svo.studies.isolation.summary import to_json
 
-    with progress("Runs") as update:
-        folder = run_detection_study(
-            configuration, out, workers=workers, scheduler=scheduler, resume=resume, progress=update
-        )
-    announce("Writing summary, pictures and report")
-    found = publish(folder, the_plant)
-    if as_json:
-        print_json({"configuration": configuration.to_dict(), **found.to_dict()})
-        return
-    print_detector_study(found)
-    typer.echo(f"Report: {out / 'report.html'}")
+    summaries = publish(folder, plant)
+    if json is None:
+        print_study(plant, summaries)
+    else:
+        print_json({**json, "summary": to_json(summaries)})
+
+
+def _detector_study(folder: Any, plant: Any, json: dict[str, Any] | None) -> None:
+    from svo.studies.thresholds import publish
+
+    found = publish(folder, plant)
+    if json is None:
+        print_detector_study(found)
+    else:
+        print_json({**json, **found.to_dict()})
 
 
 def _need_study_extra() -> None:

@@ -129,6 +129,10 @@ class Parts(Generic[Row]):
         """The rows of intact parts, in the order of the runs given."""
         return self.format.decode([self.path(run) for run in runs], self.row) if runs else []
 
+    def failed(self, runs: Sequence[int]) -> set[int]:
+        """Those of some intact parts that have a row with an ``error``."""
+        return {run for run in runs if any(row.error for row in self.format.decode([self.path(run)], self.row))}
+
 
 def part_name(run: int) -> str:
     """The name of a run's files, without suffix."""

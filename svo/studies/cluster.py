@@ -1,52 +1,41 @@
-"""Runs of a study on a ``dask.distributed`` cluster.
+"""Jobs on a ``dask.distributed`` cluster.
 
-Workers send the outcome of a run back and this process writes it, so a cluster needs no shared file system: only the
+Workers send the outcome of a job back and this process writes it, so a cluster needs no shared file system: only the
 same software, the plant's distribution included.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
-from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from svo.store import versions
-from svo.studies.configuration import Job, StudyConfiguration
-from svo.studies.isolation.run import run_registered
-from svo.studies.isolation.store import StudyFolder
+from svo.studies.attempt import Failed, Job, Outcome, attempt
 
 if TYPE_CHECKING:
     from distributed import Client
 
-Outcome = TypeVar("Outcome")
-_AHEAD = 2  # runs handed out per thread: none waits, and an interruption leaves no long queue
+_AHEAD = 2  # jobs handed out per thread: none waits, and an interruption leaves no long queue
 _CONNECT = "15s"
 _NOT_COMPARED = "machine"  # workers may be other machines; bit for bit equality is promised on one only
 
 
-def on_cluster(
-    configuration: StudyConfiguration, folder: StudyFolder, jobs: list[Job], scheduler: str
-) -> Iterator[int]:
-    """Run jobs on the cluster and yield the number of each when it is stored; errors as `outcomes_on_cluster`."""
-    for outcome in outcomes_on_cluster(partial(run_registered, configuration.plant), jobs, scheduler):
-        folder.write(outcome, configuration)
-        yield outcome.row.run
+def outcomes_on_cluster(
+    work: Callable[[Job], Outcome], jobs: Sequence[Job], scheduler: str
+) -> Iterator[tuple[Job, Outcome | Failed]]:
+    """Each job with what ``work`` made of it, as the workers are done.
 
-
-def outcomes_on_cluster(work: Callable[[Job], Outcome], jobs: list[Job], scheduler: str) -> Iterator[Outcome]:
-    """What ``work`` makes of each job, as the workers are done with it.
-
-    A worker that dies costs the runs that it had: the scheduler gives them to another.
+    A worker that dies costs time: the scheduler gives its jobs to another. A job that several died on has failed.
 
     Parameters
     ----------
     work : function of a job
-        Can be pickled, as its answer can; what it raises names the run, as a RuntimeError.
-    jobs : list of Job
+        Can be pickled, as jobs and what it gives can.
+    jobs : sequence
     scheduler : str
         Address of the cluster's scheduler, such as ``tcp://127.0.0.1:8786``.
 
@@ -57,7 +46,7 @@ def outcomes_on_cluster(work: Callable[[Job], Outcome], jobs: list[Job], schedul
     ValueError
         If nothing answers at the address, or it has no workers.
     RuntimeError
-        If a worker has other versions of the software, a run fails, or the scheduler is lost.
+        If a worker has other versions of the software, or the scheduler is lost.
     """
     _need_distributed()
     with _quiet(), _connected(scheduler) as client, _scheduler_there(scheduler):
@@ -69,7 +58,7 @@ def outcomes_on_cluster(work: Callable[[Job], Outcome], jobs: list[Job], schedul
 def _scheduler_there(scheduler: str) -> Iterator[None]:
     try:
         yield
-    except (CancelledError, OSError) as error:  # one of a run itself is a RuntimeError by now
+    except (CancelledError, OSError) as error:  # one of a job itself is an outcome
         raise RuntimeError(
             f"the dask scheduler at {scheduler!r} is lost (it ended, or the network did); the runs that are done are "
             "kept: start it and its workers again and go on with --resume"
@@ -90,21 +79,25 @@ def _quiet() -> Iterator[None]:
             logger.setLevel(level)
 
 
-def _run_all(client: Client, work: Callable[[Job], Outcome], jobs: list[Job]) -> Iterator[Outcome]:
+def _run_all(
+    client: Client, work: Callable[[Job], Outcome], jobs: Sequence[Job]
+) -> Iterator[tuple[Job, Outcome | Failed]]:
     from distributed import as_completed
 
-    waiting, done = iter(jobs), 0
+    waiting, given, done = iter(jobs), dict[Any, Job](), 0
 
     def hand_out(count: int) -> list[Any]:
         # Not pure: a study that is started anew must run anew.
-        return [client.submit(work, job, pure=False) for job in islice(waiting, count)]
+        futures = [(client.submit(attempt, work, job, pure=False), job) for job in islice(waiting, count)]
+        given.update((future.key, job) for future, job in futures)
+        return [future for future, _ in futures]
 
     running = as_completed(hand_out(_AHEAD * sum(client.nthreads().values())), loop=client.loop)
     for future in running:
-        outcome: Outcome = _result(future)
+        job, outcome = given.pop(future.key), _result(future)
         running.update(hand_out(1))
         done += 1
-        yield outcome
+        yield job, outcome
     if done < len(jobs):  # a client that lost its scheduler may have nothing left to wait for
         raise CancelledError
 
@@ -115,9 +108,7 @@ def _result(future: Any) -> Any:
     try:
         return future.result()
     except KilledWorker as error:
-        raise RuntimeError(
-            f"several workers died on the same run ({error}); the runs that are done are kept, resume to go on"
-        ) from error
+        return Failed(f"several workers died on it ({error})")
     finally:
         future.release()
 

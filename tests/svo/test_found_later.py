@@ -10,7 +10,6 @@ import copy
 import pickle
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from numba.core.errors import TypingError
 import svo
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, WindowObserver
-from tests.svo.studies.isolation.test_runner import configuration
 
 FAILED = pytest.fail.Exception  # of pytest.raises
 
@@ -36,21 +34,6 @@ def cart() -> UncertainModel:
 
 def cart_observer() -> WindowObserver:
     return WindowObserver(cart(), initial=HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
-
-
-# -- the house -------------------------------------------------------------------------------------------------------
-
-
-
-
-@later("B12", RuntimeError, "one failing run makes a study unfinishable")
-def test_a_study_goes_on_after_a_failing_run(
-    registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from svo.studies.isolation.runner import run_study
-
-    monkeypatch.setenv("TANK_BURSTS", "1")
-    assert run_study(configuration(registered_tank, runs=1), tmp_path / "out").rows() is not None
 
 
 # -- the native core -------------------------------------------------------------------------------------------------

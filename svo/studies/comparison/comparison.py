@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from svo.detectors.detector import Detector, Kind, Setting
+from svo.logs.log import Log
 from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, first_faulty_sample, load_plant
-from svo.store import Parts
-from svo.store.parts import Row
+from svo.studies.attempt import Failed, attempt
 from svo.studies.comparison.run import ComparedRun, Condition, compare_run
 from svo.studies.comparison.store import TunedRow, comparison_parts
 from svo.studies.comparison.tuning import FaultyRun, Tuned, tune
-from svo.studies.processes import worker_processes
+from svo.studies.engine import Place, Progress, complete_parts
 
-Progress = Callable[[int, int], None]
 DISTRIBUTIONS: tuple[Distribution, ...] = ("bounded", "gaussian")
 _TRAINING, _JUDGING, _CALIBRATION = 0, 1, 2  # branches of the seed
 _RUNS_IN_PART = 20
@@ -72,6 +70,10 @@ class Comparison:
         if not 0 <= self.rate < 1:
             raise ValueError(f"rate is {self.rate}; expected a share of fault-free runs in [0, 1)")
 
+    def to_dict(self) -> dict[str, Any]:
+        """A form for JSON; lists instead of tuples."""
+        return asdict(self) | {"distributions": list(self.distributions)}
+
     def parts(self) -> Iterator[Part]:
         """The judged runs, a few of one scenario at a time."""
         scenarios = 1 + len(compared_plant(self.plant).compared_faults)
@@ -109,6 +111,15 @@ class Compared:
         """Of all detectors, in their order."""
         return [tuned.setting for (of, _), tuned in self.tuned.items() if of == distribution]
 
+    def failures(self) -> list[str]:
+        """A line for each judged run of a detector that failed: which one, and why."""
+        return [
+            f"{row.detector} (fault {row.fault}, profile {row.profile}, {row.distribution} noise, seed {row.seed}) "
+            f"failed: {row.error}"
+            for row in self.rows
+            if row.error is not None
+        ]
+
 
 def run_comparison(
     comparison: Comparison,
@@ -116,21 +127,32 @@ def run_comparison(
     progress: Progress | None = None,
     *,
     out: str | Path | None = None,
+    scheduler: str | None = None,
+    limit: float | None = None,
     resume: bool = False,
+    retry_failed: bool = False,
 ) -> Compared:
     """Tune every detector on training seeds and judge it on others.
+
+    A detector that cannot be tuned, and a run that fails, are rows with their error, and the comparison goes on.
 
     Parameters
     ----------
     comparison : Comparison
     workers : int
-        Number of processes; 1 runs in this one.
+        Number of processes; 1 without a limit runs in this one.
     progress : callable, optional
         Called with (tasks done, tasks in all).
     out : path, optional
         A folder that keeps what each task gave, so that an interrupted comparison can go on.
+    scheduler : str, optional
+        Address of a ``dask.distributed`` scheduler, whose workers do the tasks instead.
+    limit : float, optional
+        Seconds that a task may take: a detector tuned, or up to 20 runs judged; tasks then have a process of their own.
     resume : bool
         Go on with the comparison in ``out``.
+    retry_failed : bool
+        Do the tasks again in which something failed.
 
     Raises
     ------
@@ -140,28 +162,34 @@ def run_comparison(
         If a noise set is unknown, detectors share a name, ``workers`` is below 1, or the folder cannot be used (see
         `svo.studies.comparison.store.comparison_parts`).
     """
-    if workers < 1:
-        raise ValueError(f"workers is {workers}; expected at least 1 process")
+    place = Place(workers, scheduler, limit)
     detectors = compared_plant(comparison.plant).detectors(comparison.noise)
     names = [detector.name for detector in detectors]
     if len(set(names)) < len(names):
         raise ValueError(f"detectors are named {', '.join(names)}; expected different names")
-    compared = Compared(comparison, {detector.name: detector.kind for detector in detectors})
     tunings = [(distribution, index) for distribution in comparison.distributions for index in range(len(names))]
     parts = list(comparison.parts())
-    counted = functools.partial(_counted, progress, len(tunings) + len(parts))
-    kept = nullcontext() if out is None else comparison_parts(Path(out), comparison, resume)
-    with kept as keep, _pool(min(workers, max(len(tunings), len(parts)))) as submit:
-        tasks: list[tuple[Any, ...]] = [(comparison, *task) for task in tunings]
-        found = counted(0, _results(submit, _tuned_rows, tasks, keep.tuned if keep else None))
-        for (distribution, index), (row,) in zip(tunings, found, strict=True):
-            compared.tuned[distribution, names[index]] = row.tuned()
-        tasks = [(comparison, part, compared.settings(part.distribution)) for part in parts]
-        for rows in counted(len(tunings), _results(submit, judge, tasks, keep.judged if keep else None)):
-            compared.rows.extend(rows)
-    order = {key: place for place, key in enumerate(compared.tuned)}
-    compared.rows.sort(key=lambda row: order[row.distribution, row.detector])  # stable: scenarios and seeds keep theirs
-    return compared
+
+    def told(before: int) -> Progress:
+        return lambda done, _: progress(before + done, len(tunings) + len(parts)) if progress else None
+
+    with comparison_parts(None if out is None else Path(out), comparison.to_dict(), resume) as keep:
+        do = functools.partial(complete_parts, place=place, retry_failed=retry_failed)
+        tune_one = functools.partial(_tuned_rows, comparison)
+        tuned = do(tune_one, tunings, keep.tuned, lambda _, error: [TunedRow.failed(error)], progress=told(0))
+        found = dict(zip(tunings, tuned, strict=True))
+        tasks = [(part, [found[part.distribution, index] for index in range(len(names))]) for part in parts]
+        judge_one = functools.partial(_judged_rows, comparison)
+        fail_one = functools.partial(_failed_rows, comparison)
+        rows = do(judge_one, tasks, keep.judged, fail_one, progress=told(len(tunings)))
+    order = {(str(distribution), names[index]): place for place, (distribution, index) in enumerate(tunings)}
+    rows.sort(key=lambda row: order[row.distribution, row.detector])  # stable: scenarios and seeds keep theirs
+    return Compared(
+        comparison,
+        {detector.name: detector.kind for detector in detectors},
+        {key: tuned[place].tuned() for key, place in order.items() if tuned[place].error is None},
+        rows,
+    )
 
 
 @functools.cache
@@ -180,20 +208,30 @@ def tune_detector(comparison: Comparison, distribution: Distribution, index: int
     return _tune(comparison, plant, detector, ((HEALTHY, HEALTHY), *offer.compared_faults))
 
 
-def judge(comparison: Comparison, part: Part, settings: Sequence[Setting]) -> list[ComparedRun]:
+def judge(comparison: Comparison, part: Part, settings: Sequence[Setting | Failed]) -> list[ComparedRun]:
     """All detectors over some runs of one scenario: every run is simulated once."""
     offer = compared_plant(comparison.plant)
     plant, detectors = offer.with_noise(part.distribution), offer.detectors(comparison.noise)
-    fault, profile = ((HEALTHY, HEALTHY), *offer.compared_faults)[part.scenario]
-    condition = Condition(part.distribution, fault, profile, fault_start(plant, fault, profile))
+    condition = _condition(comparison, part)
     rows = []
     for place, seed in enumerate(part.seeds):
-        log = plant.simulate(fault, profile, comparison.noise, seed)
+        log = attempt(plant.simulate, condition.fault, condition.profile, comparison.noise, seed)
         for detector, setting in zip(detectors, settings, strict=True):
             if place == 0:
-                compare_run(detector, setting, log, condition, seed)  # untimed: no judged run pays for compilation
-            rows.append(compare_run(detector, setting, log, condition, seed))
+                _judge_one(detector, setting, log, condition, seed)  # untimed: no judged run pays for compilation
+            rows.append(_judge_one(detector, setting, log, condition, seed))
     return rows
+
+
+def _judge_one(
+    detector: Detector, setting: Setting | Failed, log: Log | Failed, condition: Condition, seed: int
+) -> ComparedRun:
+    row: ComparedRun | Failed
+    if isinstance(setting, Failed):
+        row = setting
+    else:
+        row = log if isinstance(log, Failed) else attempt(compare_run, detector, setting, log, condition, seed)
+    return ComparedRun.failed(condition, detector.name, seed, row.error) if isinstance(row, Failed) else row
 
 
 def _tune(comparison: Comparison, plant: Plant, detector: Detector, scenarios: Sequence[tuple[str, str]]) -> Tuned:
@@ -227,44 +265,24 @@ class _Prepared(Sequence[Any]):
         return self._detector.prepare(self._plant.simulate(HEALTHY, HEALTHY, self._noise, self._seeds[index]))
 
 
-Submit = Callable[..., Callable[[], Any]]
+def _condition(comparison: Comparison, part: Part) -> Condition:
+    offer = compared_plant(comparison.plant)
+    fault, profile = ((HEALTHY, HEALTHY), *offer.compared_faults)[part.scenario]
+    plant = offer.with_noise(part.distribution)
+    return Condition(part.distribution, fault, profile, fault_start(plant, fault, profile))
 
 
-@contextmanager
-def _pool(workers: int) -> Iterator[Submit]:
-    """What starts a call, here or in one of so many processes, and gives a function that waits for its result."""
-    if workers == 1:
-        yield functools.partial
-        return
-    with worker_processes(workers, finish=False) as pool:  # a task may take minutes
-        yield lambda *call: pool.submit(*call).result
+def _tuned_rows(comparison: Comparison, tuning: tuple[Distribution, int]) -> list[TunedRow]:
+    return [TunedRow.of(tune_detector(comparison, *tuning))]
 
 
-def _results(
-    submit: Submit, function: Callable[..., list[Row]], tasks: Sequence[tuple[Any, ...]], keep: Parts[Row] | None
-) -> Iterator[list[Row]]:
-    """The rows of each task, in the order of the tasks; of those that are kept, without doing them again."""
-    done = set() if keep is None else set(keep.survey().intact)
-    results = {
-        place: submit(_kept, keep, place, function, task) for place, task in enumerate(tasks) if place not in done
-    }
-    for place in range(len(tasks)):
-        yield results[place]() if place in results else keep.rows([place])  # type: ignore[union-attr]
+def _judged_rows(comparison: Comparison, task: tuple[Part, Sequence[TunedRow]]) -> list[ComparedRun]:
+    part, tuned = task
+    settings = [row.tuned().setting if row.error is None else Failed(f"not tuned: {row.error}") for row in tuned]
+    return judge(comparison, part, settings)
 
 
-def _kept(keep: Parts[Row] | None, place: int, function: Callable[..., list[Row]], task: tuple[Any, ...]) -> list[Row]:
-    rows = function(*task)
-    if keep is not None:
-        keep.write(place, rows)
-    return rows
-
-
-def _tuned_rows(comparison: Comparison, distribution: Distribution, index: int) -> list[TunedRow]:
-    return [TunedRow.of(tune_detector(comparison, distribution, index))]
-
-
-def _counted(progress: Progress | None, total: int, done: int, results: Iterator[Any]) -> Iterator[Any]:
-    for count, result in enumerate(results, start=done + 1):
-        if progress is not None:
-            progress(count, total)
-        yield result
+def _failed_rows(comparison: Comparison, task: tuple[Part, Sequence[TunedRow]], error: str) -> list[ComparedRun]:
+    part, _ = task
+    condition, detectors = _condition(comparison, part), compared_plant(comparison.plant).detectors(comparison.noise)
+    return [ComparedRun.failed(condition, d.name, seed, error) for seed in part.seeds for d in detectors]

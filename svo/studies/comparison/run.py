@@ -30,7 +30,7 @@ class ComparedRun:
     delay_s : float or None
         From the fault to the last switch from false to true (section 2.4 of the survey). None too if the alarm is
         from before the fault.
-    false_alarm : bool
+    false_alarm : bool or None
         An alarm before the fault; at any time in a run without one.
     false_detection_rate, non_detection_rate : float or None
         Shares of time, before and from the fault on.
@@ -38,10 +38,12 @@ class ComparedRun:
         The first fault whose naming began at or after the fault; what was named before tells nothing of it.
     isolation_delay_s : float or None
         To that naming, if it is right.
-    microseconds_per_sample : float
+    microseconds_per_sample : float or None
         CPU time, everything that depends on the log included.
     width : float or None
         Mean over samples and quantities of the width of the detector's bounds.
+    error : str or None
+        Why the run failed; None if it did not.
     """
 
     distribution: str
@@ -51,13 +53,20 @@ class ComparedRun:
     seed: int
     first_alarm_s: float | None
     delay_s: float | None
-    false_alarm: bool
+    false_alarm: bool | None
     false_detection_rate: float | None
     non_detection_rate: float | None
     isolated_as: str | None
     isolation_delay_s: float | None
-    microseconds_per_sample: float
+    microseconds_per_sample: float | None
     width: float | None
+    error: str | None = None
+
+    @classmethod
+    def failed(cls, condition: Condition, detector: str, seed: int, error: str) -> ComparedRun:
+        """The row of a detector's run that failed."""
+        identity = (condition.distribution, detector, condition.fault, condition.profile, seed)
+        return cls(*identity, None, None, None, None, None, None, None, None, None, error)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -16,21 +17,23 @@ from svo.store.tables import Json
 from svo.studies.comparison.run import ComparedRun
 from svo.studies.comparison.tuning import Tuned
 
-if TYPE_CHECKING:
-    from svo.studies.comparison.comparison import Comparison
-
-FORMAT = "svo-comparison-1"
+FORMAT = "svo-comparison-2"
 
 
 @dataclass(frozen=True)
 class TunedRow:
-    """A `Tuned` as plain data."""
+    """A `Tuned` as plain data, or why there is none."""
 
     level: float
     parameters: dict[str, float]
     learned: dict[str, Any]
     cost: float
     evaluations: int
+    error: str | None = None
+
+    @classmethod
+    def failed(cls, error: str) -> TunedRow:
+        return cls(np.nan, {}, {}, np.nan, 0, error)
 
     @classmethod
     def of(cls, tuned: Tuned) -> TunedRow:
@@ -53,8 +56,8 @@ class ComparisonParts:
 
 
 @contextmanager
-def comparison_parts(folder: Path, comparison: Comparison, resume: bool) -> Iterator[ComparisonParts]:
-    """The parts of a comparison in a folder, with other processes kept out of it.
+def comparison_parts(out: Path | None, configuration: Mapping[str, Any], resume: bool) -> Iterator[ComparisonParts]:
+    """The parts of a comparison in a folder, with other processes kept out of it; without one they are not kept.
 
     Raises
     ------
@@ -62,7 +65,11 @@ def comparison_parts(folder: Path, comparison: Comparison, resume: bool) -> Iter
         If the folder holds a comparison and ``resume`` is False, or another comparison, or another process is at
         work in it.
     """
-    now = Identity(FORMAT, asdict(comparison) | {"distributions": list(comparison.distributions)}, versions())
+    if out is None:
+        with TemporaryDirectory() as passing, comparison_parts(Path(passing), configuration, resume) as parts:
+            yield parts
+        return
+    folder, now = out, Identity(FORMAT, configuration, versions())
     folder.mkdir(parents=True, exist_ok=True)
     identity = folder / "comparison.json"
     with locked(folder):

@@ -89,15 +89,15 @@ class ComparisonRow:
 
 
 def comparison_table(compared: Compared) -> list[ComparisonRow]:
-    """Rows in the order of distributions, detectors and scenarios."""
+    """Rows in the order of distributions, detectors and scenarios; runs that failed are left out."""
     groups: dict[tuple[str, str, str, str], list[ComparedRun]] = {}
-    for run in compared.rows:
+    for run in (run for run in compared.rows if run.error is None):
         groups.setdefault((run.distribution, run.detector, run.fault, run.profile), []).append(run)
     healthy = {key[:2]: runs for key, runs in groups.items() if key[2] == HEALTHY}
     return [
         _row(key, runs, healthy[key[:2]], compared.kinds[key[1]], compared.tuned[key[:2]])
         for key, runs in groups.items()
-        if key[2] != HEALTHY
+        if key[2] != HEALTHY and key[:2] in healthy
     ]
 
 
@@ -127,13 +127,13 @@ def _row(
         kind,
         fault,
         profile,
-        false_alarms=Share(sum(run.false_alarm for run in healthy), len(healthy)),
+        false_alarms=Share.true([run.false_alarm for run in healthy]),
         detect=Delays.of([None if run.false_alarm else run.first_alarm_s for run in runs]),
         settled=Delays.of([run.delay_s for run in runs]),
         non_detection_rate=float(np.mean(missed)) if missed else None,
         isolate=Delays.of([run.isolation_delay_s for run in runs]),
-        wrong_isolations=Share(sum(run.isolated_as not in (None, fault) for run in runs), len(runs)),
-        microseconds_per_sample=float(np.median([run.microseconds_per_sample for run in runs])),
+        wrong_isolations=Share.true([run.isolated_as not in (None, fault) for run in runs]),
+        microseconds_per_sample=float(np.median([run.microseconds_per_sample or 0.0 for run in runs])),
         width=float(np.mean(widths)) if widths else None,
         tuned=tuned,
     )

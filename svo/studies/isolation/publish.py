@@ -8,6 +8,7 @@ from svo.studies.isolation.interactive import interactive_section
 from svo.studies.isolation.report import write_report
 from svo.studies.isolation.store import StudyFolder
 from svo.studies.isolation.summary import ConditionSummary, summarise, write_summary
+from svo.studies.runs import failures, finished_runs
 
 
 def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) -> list[ConditionSummary]:
@@ -16,9 +17,10 @@ def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) ->
     Raises
     ------
     ValueError
-        If parts of the study are damaged, unless these are to be left out.
+        If parts of the study are damaged, unless these are to be left out, or all runs failed.
     """
-    rows, exemplars = folder.rows(without_damaged), folder.exemplars(without_damaged)
+    every = folder.rows(without_damaged)
+    rows, exemplars = finished_runs(every), folder.exemplars(without_damaged)
     summaries = summarise(rows)
     write_summary(folder.path / "summary.csv", summaries)
     pictures = write_pictures(folder.path, plant, summaries, exemplars)
@@ -27,5 +29,7 @@ def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) ->
         added = plant.exhibits(folder.path, asked["runs"], asked["seed"], asked["noise"])
         pictures += [Picture(exhibit.path, exhibit.title, exhibit.caption) for exhibit in added]
     interactive = interactive_section(plant, rows, exemplars)
-    write_report(folder.path / "report.html", plant, folder.identity(), summaries, pictures, interactive)
+    write_report(
+        folder.path / "report.html", plant, folder.identity(), summaries, pictures, interactive, failures(every)
+    )
     return summaries

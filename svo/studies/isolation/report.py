@@ -42,6 +42,7 @@ def write_report(
     summaries: Sequence[ConditionSummary],
     pictures: Iterable[Picture],
     interactive: str = "",
+    failed: Sequence[str] = (),
 ) -> None:
     """Write the report of a study.
 
@@ -57,13 +58,15 @@ def write_report(
         Embedded into the page.
     interactive : str
         HTML of the views that a reader can move in (`svo.studies.isolation.interactive`).
+    failed : sequence of str
+        A line for each run that failed (`svo.studies.runs.failures`).
     """
     configuration = identity["configuration"]
     parts = [
         f"<h1>Isolation-time study: {escape(plant.title)}</h1>",
         f'<p class="soft">{escape(_subtitle(summaries, configuration))}</p>',
         "<h2>What came out</h2>",
-        _findings(summaries),
+        _findings(summaries, failed),
         *(html_table(tables.delay_table(plant, group)) for group in _by_noise(summaries)),
         f'<p class="soft">Paper: {escape(plant.reference_title)}; a dash where it says nothing.</p>'
         if plant.reference
@@ -127,8 +130,8 @@ def _subtitle(summaries: Sequence[ConditionSummary], configuration: Mapping[str,
     return f"{runs} runs, seed {configuration['seed']}, noise: {', '.join(configuration['noise'])}"
 
 
-def _findings(summaries: Sequence[ConditionSummary]) -> str:
-    lines = [*tables.counts(summaries), *tables.not_isolated(summaries), tables.cost(summaries)]
+def _findings(summaries: Sequence[ConditionSummary], failed: Sequence[str]) -> str:
+    lines = [*failed, *tables.counts(summaries), *tables.not_isolated(summaries), tables.cost(summaries)]
     return (
         '<ul class="findings">' + "".join(f"<li>{escape(line[0].upper() + line[1:])}.</li>" for line in lines) + "</ul>"
     )

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
@@ -14,14 +11,17 @@ from svo.indices import judge_alarm
 from svo.isolation.alarms import Alarm
 from svo.isolation.record import BankRecord
 from svo.logs.log import Log
-from svo.plant import HEALTHY, Plant, first_faulty_sample, in_architecture, load_plant
+from svo.plant import HEALTHY, Plant, first_faulty_sample, in_architecture
 from svo.studies.configuration import Job
 from svo.studies.isolation.exemplar import Exemplar, follow
+from svo.studies.runs import registered_plant
 
 
 @dataclass(frozen=True)
 class RunRow:
     """One row of the run table. Delays that were not reached within the run are None.
+
+    Of a run that failed it has what was asked for and the error, and None for the rest.
 
     Attributes
     ----------
@@ -36,18 +36,20 @@ class RunRow:
         Isolation is that of the true fault; an alarm before the fault is a false alarm and no detection.
     isolated_as : str or None
         The fault whose observer was left alone.
-    false_alarm : bool
+    false_alarm : bool or None
         The nominal model was falsified before the fault (at any time, without one).
-    wrong_isolation : bool
+    wrong_isolation : bool or None
         The true fault's observer was falsified, or another one was left alone.
-    alive_end : str
+    alive_end : str or None
         Models alive at the end of the run, separated by ", ".
-    microseconds_per_step, microseconds_p99 : float
+    microseconds_per_step, microseconds_p99 : float or None
         Median and 99th percentile over the observers that were alive and the samples.
-    undecided : int
+    undecided : int or None
         Answers of observers that were neither a proof nor a point: solver trouble, never an alarm.
     architecture : str or None
         Of the bank; None for a plant that has one kind of bank only.
+    error : str or None
+        Why the run failed; None if it did not.
     """
 
     run: int
@@ -55,17 +57,23 @@ class RunRow:
     fault: str
     profile: str
     noise: str
-    first_alarm_s: float | None
-    detection_delay_s: float | None
-    isolation_delay_s: float | None
-    isolated_as: str | None
-    false_alarm: bool
-    wrong_isolation: bool
-    alive_end: str
-    microseconds_per_step: float
-    microseconds_p99: float
-    undecided: int
+    first_alarm_s: float | None = None
+    detection_delay_s: float | None = None
+    isolation_delay_s: float | None = None
+    isolated_as: str | None = None
+    false_alarm: bool | None = None
+    wrong_isolation: bool | None = None
+    alive_end: str | None = None
+    microseconds_per_step: float | None = None
+    microseconds_p99: float | None = None
+    undecided: int | None = None
     architecture: str | None = None
+    error: str | None = None
+
+    @classmethod
+    def failed(cls, job: Job, error: str) -> RunRow:
+        """The row of a run that failed."""
+        return cls(job.run, job.seed, job.fault, job.profile, job.noise, architecture=job.architecture, error=error)
 
 
 @dataclass(frozen=True)
@@ -77,26 +85,9 @@ class RunOutcome:
     exemplar: Exemplar | None
 
 
-@cache
-def registered_plant(name: str) -> Plant:
-    """A plant by its name; loaded once a process, since its tables may take a while."""
-    return load_plant(name)
-
-
 def run_registered(plant: str, job: Job) -> RunOutcome:
-    """One run of a registered plant, in whatever process; RuntimeError that names the run if it fails."""
-    with failure_named(job):
-        return execute(registered_plant(plant), job)
-
-
-@contextmanager
-def failure_named(job: Job) -> Iterator[None]:
-    """Turn what a run raises into a RuntimeError that names the run."""
-    try:
-        yield
-    except Exception as error:
-        where = f"fault {job.fault}, profile {job.profile}, noise {job.noise}, seed {job.seed}"
-        raise RuntimeError(f"run {job.run} ({where}) failed: {type(error).__name__}: {error}") from error
+    """One run of a registered plant, in whatever process."""
+    return execute(registered_plant(plant), job)
 
 
 def execute(plant: Plant, job: Job) -> RunOutcome:

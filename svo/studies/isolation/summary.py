@@ -29,6 +29,11 @@ class Share:
     def value(self) -> float:
         return self.count / self.of
 
+    @classmethod
+    def true(cls, flags: Sequence[bool | None]) -> Share:
+        """How many of some flags are true."""
+        return cls(sum(map(bool, flags)), len(flags))
+
     @property
     def interval(self) -> tuple[float, float]:
         """Bounds of the share at the confidence of the module, 95 %."""
@@ -104,9 +109,12 @@ class ConditionSummary:
 
 
 def summarise(rows: Iterable[RunRow]) -> list[ConditionSummary]:
-    """One summary per noise set, fault, profile and architecture, in the order of their first runs."""
+    """One summary per noise set, fault, profile and architecture, in the order of their first runs.
+
+    Runs that failed are left out.
+    """
     groups: dict[tuple[str, str, str, str | None], list[RunRow]] = {}
-    for row in rows:
+    for row in (row for row in rows if row.error is None):
         groups.setdefault((row.noise, row.fault, row.profile, row.architecture), []).append(row)
     return [_summarise(*key, group) for key, group in groups.items()]
 
@@ -121,9 +129,7 @@ def to_json(summaries: Iterable[ConditionSummary]) -> list[dict[str, Any]]:
     return [asdict(summary) for summary in summaries]
 
 
-def _summarise(
-    noise: str, fault: str, profile: str, architecture: str | None, rows: list[RunRow]
-) -> ConditionSummary:
+def _summarise(noise: str, fault: str, profile: str, architecture: str | None, rows: list[RunRow]) -> ConditionSummary:
     kept = Counter(row.alive_end or "none" for row in rows if fault != HEALTHY and row.isolation_delay_s is None)
     return ConditionSummary(
         noise=noise,
@@ -132,12 +138,12 @@ def _summarise(
         runs=len(rows),
         detect=Delays.of([row.detection_delay_s for row in rows]),
         isolate=Delays.of([row.isolation_delay_s for row in rows]),
-        false_alarms=Share(sum(row.false_alarm for row in rows), len(rows)),
-        wrong_isolations=Share(sum(row.wrong_isolation for row in rows), len(rows)),
+        false_alarms=Share.true([row.false_alarm for row in rows]),
+        wrong_isolations=Share.true([row.wrong_isolation for row in rows]),
         survivors=dict(kept.most_common()),
-        microseconds_median=float(np.median([row.microseconds_per_step for row in rows])),
-        microseconds_p99=float(np.median([row.microseconds_p99 for row in rows])),
-        undecided=sum(row.undecided for row in rows),
+        microseconds_median=float(np.median([row.microseconds_per_step or 0.0 for row in rows])),
+        microseconds_p99=float(np.median([row.microseconds_p99 or 0.0 for row in rows])),
+        undecided=sum(row.undecided or 0 for row in rows),
         architecture=architecture,
     )
 

@@ -11,9 +11,10 @@ from typing import Any
 from svo.plant import HEALTHY
 from svo.studies.isolation.figures import Picture
 from svo.studies.isolation.report import html_facts, html_figure, html_table, write_page
-from svo.studies.isolation.store import StudyStore
 from svo.studies.isolation.summary import Share
 from svo.studies.isolation.tables import TextTable
+from svo.studies.runs import failures, finished_runs
+from svo.studies.store import StudyStore
 from svo.studies.thresholds import tables
 from svo.studies.thresholds.figures import write_pictures
 from svo.studies.thresholds.run import LEARNING_RECORDS, LearnsDetectors
@@ -66,7 +67,8 @@ class DetectionStudy:
 
 def publish(folder: StudyStore[Any], plant: LearnsDetectors, without_damaged: bool = False) -> DetectionStudy:
     """Write summary.csv, the pictures and report.html into the study's folder; errors as `StudyStore.rows`."""
-    rows = read_rows(folder, without_damaged)
+    every = read_rows(folder, without_damaged)
+    rows = finished_runs(every)
     summaries, assumption = summarise(plant, rows), summarise_assumption(rows)
     write_summary(folder.path / "summary.csv", summaries)
     windows = max((q for s in assumption for q in s.by_window), default=1)
@@ -79,7 +81,7 @@ def publish(folder: StudyStore[Any], plant: LearnsDetectors, without_damaged: bo
         summaries,
         assumption,
         [tables.detection_table(plant, group) for group in groups],
-        [*tables.assumption_lines(assumption), *_before_the_fault(summaries)],
+        [*failures(every), *tables.assumption_lines(assumption), *_before_the_fault(summaries)],
     )
     _write_report(folder.path / "report.html", plant, folder.identity(), study, pictures)
     return study

@@ -71,11 +71,13 @@ class DetectorRow:
     detection_delay_s : float or None
         From the first faulty sample, which itself counts as one sampling time, to that alarm; None if there is none,
         or if it came before the fault: that is a false alarm and no detection.
-    false_alarm : bool
+    false_alarm : bool or None
         An alarm before the fault (at any time, without one).
     violated : tuple of int
         Window lengths q at which the run's fault-free residual exceeds what was learnt: assumption (7) fails there.
         Empty in runs with a fault.
+    error : str or None
+        Why the run failed; its only row then has no records, no detector, and None for what they would have said.
     """
 
     run: int
@@ -87,8 +89,14 @@ class DetectorRow:
     detector: str
     first_alarm_s: float | None
     detection_delay_s: float | None
-    false_alarm: bool
+    false_alarm: bool | None
     violated: tuple[int, ...]
+    error: str | None = None
+
+    @classmethod
+    def failed(cls, job: Job, error: str) -> DetectorRow:
+        """The only row of a run that failed."""
+        return cls(job.run, job.seed, job.fault, job.profile, job.noise, 0, "", None, None, None, (), error)
 
 
 def execute(plant: LearnsDetectors, job: Job) -> list[DetectorRow]:

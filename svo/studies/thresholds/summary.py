@@ -73,15 +73,18 @@ class AssumptionSummary:
 
 
 def summarise(plant: LearnsDetectors, rows: Iterable[DetectorRow]) -> list[DetectorSummary]:
-    """One summary per noise set, fault, profile, number of records and detector, in the order of their first runs."""
+    """One summary per noise set, fault, profile, number of records and detector, in the order of their first runs.
+
+    Runs that failed are left out.
+    """
     groups: dict[tuple[str, str, str, int, str], list[DetectorRow]] = {}
-    for row in rows:
+    for row in (row for row in rows if row.error is None):
         groups.setdefault((row.noise, row.fault, row.profile, row.records, row.detector), []).append(row)
     return [
         DetectorSummary(
             *key,
             detect=Delays.of([row.detection_delay_s for row in group]),
-            false_alarms=Share(sum(row.false_alarm for row in group), len(group)),
+            false_alarms=Share.true([row.false_alarm for row in group]),
             start=fault_start(plant, key[1], key[2]),
             Ts=plant.Ts,
             paper=plant.detection_reference.get((key[1], key[2]), {}).get(key[4]),
@@ -94,7 +97,7 @@ def summarise_assumption(rows: Iterable[DetectorRow]) -> list[AssumptionSummary]
     """One summary per noise set and number of records, of the fault-free runs; empty if there are none."""
     groups: dict[tuple[str, int], dict[int, list[DetectorRow]]] = {}
     for row in rows:
-        if row.fault == HEALTHY:
+        if row.fault == HEALTHY and row.error is None:
             groups.setdefault((row.noise, row.records), {}).setdefault(row.run, []).append(row)
     found = []
     for (noise, records), runs in groups.items():
@@ -103,8 +106,8 @@ def summarise_assumption(rows: Iterable[DetectorRow]) -> list[AssumptionSummary]
             AssumptionSummary(
                 noise,
                 records,
-                runs=Share(sum(bool(v) for v in violated), len(violated)),
-                alarmed=Share(sum(any(row.false_alarm for row in group) for group in runs.values()), len(runs)),
+                runs=Share.true([bool(v) for v in violated]),
+                alarmed=Share.true([any(row.false_alarm for row in group) for group in runs.values()]),
                 by_window=dict(sorted(Counter(q for v in violated for q in v).items())),
             )
         )

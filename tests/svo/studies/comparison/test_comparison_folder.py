@@ -14,6 +14,7 @@ from compared_plant import SmallPlant
 from test_comparison import registered, untimed  # noqa: F401  (a fixture)
 
 from svo.store import locked
+from svo.studies.comparison import comparison as module
 from svo.studies.comparison.comparison import Comparison, run_comparison
 from svo.studies.comparison.publish import publish_comparison
 
@@ -88,3 +89,36 @@ def test_ctrl_c_says_what_is_true(tmp_path):
             return
         time.sleep(0.1)
     pytest.fail("workers of an interrupted comparison are still there after 30 s")
+
+
+def test_what_fails_is_a_row_and_can_be_tried_again(tmp_path, monkeypatch):
+    """A detector that cannot be tuned, and one whose runs fail: the others are compared, and a retry mends both."""
+    tune, judge = module.tune_detector, module.compare_run
+
+    def broken_tune(comparison, distribution, index):
+        if index == 2:
+            raise ArithmeticError("no level")
+        return tune(comparison, distribution, index)
+
+    def broken_judge(detector, setting, log, condition, seed):
+        if detector.name == "CUSUM" and condition.fault == "second":
+            sys.exit(0)
+        return judge(detector, setting, log, condition, seed)
+
+    monkeypatch.setattr(module, "tune_detector", broken_tune)
+    monkeypatch.setattr(module, "compare_run", broken_judge)
+    broken = run_comparison(FEW, out=tmp_path)
+    failed = [row for row in broken.rows if row.error is not None]
+    assert {(row.detector, row.error) for row in failed} == {
+        ("Kalman, chi-square", "not tuned: ArithmeticError: no level"),
+        ("CUSUM", "SystemExit: 0"),
+    }
+    assert len(failed) == len(broken.failures()) == 6 + 2
+    assert len(publish_comparison(tmp_path, broken, SmallPlant())) == 5 * 2 + 1
+    monkeypatch.undo()
+    whole = run_comparison(FEW)
+    assert list(map(untimed, whole.rows))[:12] == list(map(untimed, broken.rows))[:12]
+    resumed = run_comparison(FEW, out=tmp_path, resume=True)
+    assert len(resumed.failures()) == 8
+    again = run_comparison(FEW, out=tmp_path, resume=True, retry_failed=True)
+    assert list(map(untimed, again.rows)) == list(map(untimed, whole.rows))

@@ -9,10 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
+from typer.testing import CliRunner
 
+from svo.cli import app
 from svo.plant import load_plant
 from svo.studies.configuration import StudyConfiguration
+from svo.studies.isolation.publish import publish
 from svo.studies.isolation.run import RunRow
 from svo.studies.isolation.runner import run_study
 from svo.studies.isolation.store import StudyFolder
@@ -114,15 +118,57 @@ def test_a_finished_study_can_be_resumed_without_running_anything(registered_tan
     assert folder.alarms.read_bytes() == alarms
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_run_that_fails_is_named(
-    registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: int
+def burst(monkeypatch: pytest.MonkeyPatch, how: str) -> None:
+    monkeypatch.setenv("TANK_BURSTS_IN", "gauge")
+    monkeypatch.setenv("TANK_BURSTS", how)
+
+
+@pytest.mark.parametrize(("how", "error"), [("raise", "ArithmeticError: the tank burst"), ("exit", "SystemExit: 0")])
+def test_a_run_that_fails_is_a_row_and_can_be_tried_again(
+    registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, error: str
 ) -> None:
-    monkeypatch.setenv("TANK_BURSTS", "1")
-    with pytest.raises(
-        RuntimeError, match=r"run \d \(fault gauge, profile step, noise (calm|rough), seed \d+\) failed: .*burst"
-    ):
-        run_study(configuration(registered_tank, faults=("gauge",)), tmp_path, workers=workers)
+    wanted = configuration(registered_tank, noise=("calm",))
+    whole = run_study(wanted, tmp_path / "whole")
+    burst(monkeypatch, how)
+    rows = run_study(wanted, tmp_path / "out").rows()
+    assert [row.error for row in rows] == [None] * 6 + [error] * 2
+    assert untimed(rows[:6]) == untimed(whole.rows()[:6])
+    assert rows[6] == RunRow(6, whole.rows()[6].seed, "gauge", "step", "calm", error=error)
+    calls: list[tuple[int, int]] = []
+    run_study(wanted, tmp_path / "out", resume=True, progress=lambda *done: calls.append(done))
+    assert calls == [(8, 8)]  # a run that failed is done, unless it is asked for
+    monkeypatch.delenv("TANK_BURSTS_IN")
+    again = run_study(wanted, tmp_path / "out", resume=True, retry_failed=True, progress=lambda *d: calls.append(d))
+    assert calls[1:] == [(6, 8), (7, 8), (8, 8)]
+    assert untimed(again.rows()) == untimed(whole.rows())
+    assert again.alarms.read_bytes() == whole.alarms.read_bytes()
+
+
+def test_a_crash_in_a_plant_is_a_row_and_the_command_names_it(
+    registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With one worker too: the command gives every run a process that may die."""
+    burst(monkeypatch, "segfault")
+    command = ["study", "tank", "--runs", "1", "--seed", "3", "--workers", "1", "--out", str(tmp_path / "out")]
+    answer = CliRunner().invoke(app, command)
+    assert answer.exit_code == 1
+    assert "error: run 3 (fault gauge, profile step, noise calm, seed " in answer.output
+    assert "failed: its process was ended by SIGSEGV" in answer.output
+    assert "--resume --retry-failed" in answer.output
+    assert "detected: 2 of 2" in answer.output  # the others are judged
+    table = pq.read_table(tmp_path / "out" / "runs.parquet")
+    assert [error is not None for error in table["error"].to_pylist()] == [False, False, False, True]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "its process was ended by SIGSEGV" in page
+
+
+def test_a_study_in_which_all_runs_fail_is_one_clear_error(
+    registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    burst(monkeypatch, "raise")
+    folder = run_study(configuration(registered_tank, faults=("gauge",)), tmp_path)
+    with pytest.raises(ValueError, match=r"all 4 runs failed; run 0 \(fault gauge, .*burst; --resume --retry-failed"):
+        publish(folder, load_plant(registered_tank))
 
 
 def test_at_least_one_worker(registered_tank: str, tmp_path: Path) -> None:

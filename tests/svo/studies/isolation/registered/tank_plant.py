@@ -5,7 +5,9 @@ It proves that studies, reports and the command line know nothing but the protoc
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -53,8 +55,8 @@ class Tank:
         return 4.0
 
     def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
-        if os.environ.get("TANK_BURSTS"):
-            raise ArithmeticError("the tank burst")
+        if fault == os.environ.get("TANK_BURSTS_IN"):
+            burst(os.environ["TANK_BURSTS"])
         rng = np.random.default_rng(seed)
         disturbance, error = BOUNDS[noise]
         samples = round(self.duration(fault, profile) / self.Ts)
@@ -85,6 +87,15 @@ class Tank:
 
     def scheduler(self) -> Callable[[Any], None]:
         return lambda y: None
+
+
+def burst(how: str) -> None:
+    """What can go wrong in anyone's plant."""
+    if how == "exit":
+        sys.exit(0)
+    if how == "segfault":
+        ctypes.string_at(0)
+    raise ArithmeticError("the tank burst")
 
 
 def tank() -> Tank:

@@ -1,0 +1,83 @@
+"""Studies of simulated runs of a plant, whatever is judged in them: what is run, where, and what failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from typing import Any, Protocol, TypeVar
+
+from svo.plant import Plant, load_plant
+from svo.studies.configuration import Job, StudyConfiguration
+from svo.studies.engine import Place, Progress, complete
+from svo.studies.store import StudyStore
+
+
+class Identified(Protocol):
+    """What rows of all run tables say of their run."""
+
+    @property
+    def run(self) -> int: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def fault(self) -> str: ...
+    @property
+    def profile(self) -> str: ...
+    @property
+    def noise(self) -> str: ...
+    @property
+    def error(self) -> str | None: ...
+
+
+AnyRow = TypeVar("AnyRow", bound=Identified)
+
+
+@cache
+def registered_plant(name: str) -> Plant:
+    """A plant by its name; loaded once a process, since its tables may take a while."""
+    return load_plant(name)
+
+
+def run_into(
+    folder: StudyStore[Any],
+    work: Callable[[str, Job], Any],
+    configuration: StudyConfiguration,
+    place: Place,
+    *,
+    resume: bool = False,
+    retry_failed: bool = False,
+    progress: Progress | None = None,
+) -> None:
+    """Run what is still to be run of a study and store it, run by run; ``work`` takes the plant's name and a job."""
+    jobs = configuration.jobs(registered_plant(configuration.plant))
+    with folder.open(configuration, len(jobs), resume=resume, retry_failed=retry_failed) as done:
+
+        def keep(number: int, outcome: Any) -> None:
+            folder.keep(configuration, jobs[number], outcome)
+
+        complete(partial(work, configuration.plant), jobs, done, keep, place, progress)
+        folder.join_alarms()
+
+
+def failures(rows: Sequence[Identified]) -> list[str]:
+    """A line for each run that failed: which one, and why."""
+    return [
+        f"run {row.run} (fault {row.fault}, profile {row.profile}, noise {row.noise}, seed {row.seed}) failed: "
+        f"{row.error}"
+        for row in rows
+        if row.error is not None
+    ]
+
+
+def finished_runs(rows: Sequence[AnyRow]) -> list[AnyRow]:
+    """The rows of runs that did not fail.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    finished = [row for row in rows if row.error is None]
+    if not finished:
+        raise ValueError(f"all {len(rows)} runs failed; {failures(rows)[0]}; --resume --retry-failed tries them again")
+    return finished
