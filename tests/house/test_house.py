@@ -35,7 +35,6 @@ def test_rooms_import_in_no_circle() -> None:
     assert not circles(room_graph())
 
 
-@pytest.mark.xfail(strict=True, raises=AssertionError, reason="in observers.window and studies.comparison")
 def test_files_import_in_no_circle() -> None:
     assert not circles(file_graph())
 
