@@ -25,7 +25,7 @@ console = Console(width=150)
 
 def window(horizon: int | None, template: str | np.ndarray = "box") -> Start:
     """Starts window observers of so many steps."""
-    return lambda model, initial: WindowObserver(model, initial, horizon, template)
+    return lambda model, initial: WindowObserver(model, initial, horizon=horizon, template=template)
 
 
 def output_directions(model: UncertainModel, powers: int = 1) -> np.ndarray:

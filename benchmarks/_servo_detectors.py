@@ -60,13 +60,13 @@ def learn(records: Log) -> tuple[FirstOrderFit, NoiseCharacterization]:
     fit = identify_first_order(records)
     fit = replace(fit, gains=gains_of_parts(fit))
     residual = predictor(fit, records).predict(records).residual
-    return fit, NoiseCharacterization.from_records(residual, QBAR, SAFETY)
+    return fit, NoiseCharacterization.from_records(residual, QBAR, safety_factor=SAFETY)
 
 
 def gains_of_parts(fit: FirstOrderFit) -> GainBounds:
     """Bounds that reach the fits of the parts and no further: what happens from sample to sample is learnt as noise."""
     radii = np.abs(fit.parts - [fit.gains.gc, fit.gains.hc]).max(axis=0, initial=0.0)
-    return GainBounds(fit.gains.gc, float(radii[0]), fit.gains.hc, float(radii[1]))
+    return GainBounds(fit.gains.gc, float(radii[0]), hc=fit.gains.hc, hr=float(radii[1]))
 
 
 def predictor(fit: FirstOrderFit, log: Log) -> IntervalPredictor:

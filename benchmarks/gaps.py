@@ -53,7 +53,7 @@ def cases() -> dict[str, Any]:
     for words, promise in promises.items():
         for name, model in (("rotation", rotation(**promise)), ("unstable", unstable(**promise))):
             for horizon in (1, 10):
-                found[f"{name}, N = {horizon}{words}"] = WindowObserver(model, start(model), horizon)
+                found[f"{name}, N = {horizon}{words}"] = WindowObserver(model, start(model), horizon=horizon)
         model = rotation(**promise)
         found[f"rotation, zonotope{words}"] = ConstrainedZonotopeObserver(model, start(model))
         wide = model.replace(w=[0.2, 0.2])
@@ -103,7 +103,7 @@ def width_after(driven: Any, samples: int, rng: np.random.Generator) -> tuple[fl
     observer = nominal(driven)
     model = observer.model.replace(physical=None, largest=None)
     same = {"horizon": observer.horizon} if isinstance(observer, WindowObserver) else {}
-    reference, since = type(observer)(model, start(model), **same), WindowObserver(model, start(model), None)
+    reference, since = type(observer)(model, start(model), **same), WindowObserver(model, start(model), horizon=None)
     since.lose_set()
     log = model.simulate(rng.uniform(-1.0, 1.0, model.n_states), np.zeros((BEFORE + samples, 0)), rng)
     outside, verdicts, ratios = 0, [], np.array([np.inf, np.inf])
@@ -166,7 +166,7 @@ def after_loss(count: int, horizon: int = 10, seed: int = SEED) -> AfterLoss:
         if np.linalg.cond(np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(n)])) > 1e4:
             continue
         model = UncertainModel(A, None, C, E=np.eye(n), w=np.full(n, 0.1), n=0.05)
-        lost = WindowObserver(model, start(model), horizon)
+        lost = WindowObserver(model, start(model), horizon=horizon)
         lost.lose_set()
         lost.update(np.full(len(C), np.nan))
         ratio, limit, out, verdicts = width_after(lost, 10 + n, rng)

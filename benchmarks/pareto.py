@@ -72,7 +72,7 @@ def main(given: list[str] | None = None) -> None:
                 observer = (
                     ConstrainedZonotopeObserver(model, initial)
                     if template == ZONOTOPE
-                    else WindowObserver(model, initial, N, templates[template])
+                    else WindowObserver(model, initial, horizon=N, template=templates[template])
                 )
                 found, cost, width = fly(observer, data, y, is_healthy)
                 if is_healthy:

@@ -28,7 +28,7 @@ def projection(P: HPolytope, kept: int, method: str) -> str:
         return "-"
     rows = 3000 if method == "fourier-motzkin" else 20_000
     try:
-        return f"{1e3 * shortest(lambda: HPolytope(P.A, P.b).project(range(kept), method, rows)):.2f}"
+        return f"{1e3 * shortest(lambda: HPolytope(P.A, P.b).project(range(kept), method=method, max_rows=rows)):.2f}"
     except ProjectionLimitError:
         return "-"
 

@@ -64,7 +64,9 @@ def main() -> None:
 def _row(name: str, log: Log, failed: float) -> list[str]:
     learning, healthy, after = between(log, *LEARN), between(log, LEARN[1], failed), between(log, LEARN[1], np.inf)
     gains = gains_of_parts(identify_first_order(learning, parts=2))
-    noise = NoiseCharacterization.from_records(_predictor(gains, learning).predict(learning).residual, QBAR, SAFETY)
+    noise = NoiseCharacterization.from_records(
+        _predictor(gains, learning).predict(learning).residual, QBAR, safety_factor=SAFETY
+    )
     found = IntervalDetector(_predictor(gains, after), noise, POLE).run(after)
     calm = found.exceeded[: len(healthy)]
     check = noise.check(_predictor(gains, healthy).predict(healthy).residual)

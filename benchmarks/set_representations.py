@@ -32,7 +32,9 @@ METHODS: dict[str, Start] = {
     "window, N = 10": window(10),
     "window, N = 20": window(20),
     "zonotope (8 n, 3 n)": OBSERVERS["zonotope"],
-    "zonotope (4 n, n)": lambda model, box: ConstrainedZonotopeObserver(model, box, 4 * box.dim, box.dim),
+    "zonotope (4 n, n)": lambda model, box: ConstrainedZonotopeObserver(
+        model, box, max_generators=4 * box.dim, max_constraints=box.dim
+    ),
     "polytope, 60 facets": OBSERVERS["polytope"],
 }
 

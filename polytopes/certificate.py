@@ -48,7 +48,7 @@ class Certificate:
         return refutes(P.A, P.b, P.C, P.d, self.inequality, self.equality)
 
     def gap(self, P: HasRows) -> float:
-        """``-(lambda'b + mu'd)`` with multipliers of sum one: how far the rows are from having a common point.
+        """``-(lambda'b + mu'd)`` with multipliers of sum one: how far the rows of P are from a common point.
 
         In the units of b.  A gap of 1e-16 of the entries of b means that rows contradict each other only by rounding.
         """
@@ -69,7 +69,7 @@ class Certificate:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Read what `to_dict` wrote.
+        """Read ``data``, what `to_dict` wrote.
 
         Raises
         ------

@@ -22,6 +22,7 @@ from polytopes.preimage import preimage
 from polytopes.product import product
 from polytopes.redundancy import minimal_rows
 from polytopes.rows import Rows, a_set, same_space
+from polytopes.signatures import options_by_name
 from polytopes.support import Ball, SupportResult
 from polytopes.vertices import vertices
 from polytopes.volume import volume
@@ -73,7 +74,7 @@ class HPolytope(Rows):
 
     @classmethod
     def from_vertices(cls, V: ArrayLike, rays: ArrayLike | None = None) -> Self:
-        """Convex hull of points (k, n), k >= 1, plus the cone of the rays (r, n) if there are any.
+        """Convex hull of points V (k, n), k >= 1, plus the cone of the rays (r, n) if there are any.
 
         In integers where the numbers are short (multiples of one power of two, up to 2^32 times), where there are rays
         and where the points are flat: the rows are exact where they are floats.  Else by Qhull, in scaled coordinates.
@@ -104,7 +105,7 @@ class HPolytope(Rows):
 
     @classmethod
     def simplex(cls, n: int) -> Self:
-        """``{x >= 0, x_1 + ... + x_n <= 1}``."""
+        """``{x >= 0, x_1 + ... + x_n <= 1}`` in n dimensions."""
         n = whole_number("n", n, least=1)
         return cls(np.vstack([-np.eye(n), np.ones((1, n))]), np.append(np.zeros(n), 1.0))
 
@@ -201,7 +202,8 @@ class HPolytope(Rows):
         """
         return affine_dim(self)
 
-    def contains(self, x: "ArrayLike | Rows", tol: float = 1e-9) -> bool | NDArray[np.bool_]:
+    @options_by_name
+    def contains(self, x: "ArrayLike | Rows", *, tol: float = 1e-9) -> bool | NDArray[np.bool_]:
         """Whether a point (n,), each of k points (k, n), or a whole set lies inside.
 
         Parameters
@@ -218,8 +220,9 @@ class HPolytope(Rows):
         inside = containment.contains_points(self, np.atleast_2d(points), slack)
         return bool(inside[0]) if points.ndim == 1 else inside
 
-    def equals(self, Q: Rows, tol: float = 1e-9) -> bool:
-        """Whether each set contains the other within `tol` (see `contains`)."""
+    @options_by_name
+    def equals(self, Q: Rows, *, tol: float = 1e-9) -> bool:
+        """Whether this set and Q contain each other within `tol` (see `contains`)."""
         return containment.equal_sets(self, same_space(self, Q), real_number("tol", tol, least=0.0))
 
     def vertices(self) -> Floats:
@@ -257,6 +260,8 @@ class HPolytope(Rows):
     def random_points(self, count: int, rng: np.random.Generator) -> Floats:
         """Points (count, n) of a bounded set, close to uniform: hit-and-run, 20 n steps of O(m n) between two points.
 
+        `rng` is a `numpy.random.Generator`.
+
         Raises
         ------
         EmptySetError, UnboundedError
@@ -281,7 +286,7 @@ class HPolytope(Rows):
         return type(self)(*minimal_rows(self))
 
     def intersection(self, Q: Rows) -> Self:
-        """Points in both sets: the rows of both, redundant ones too."""
+        """Points in both this set and Q: the rows of both, redundant ones too."""
         same_space(self, Q)
         inequalities = np.vstack([self.A, Q.A]), np.concatenate([self.b, Q.b])
         return type(self)(*inequalities, np.vstack([self.C, Q.C]), np.concatenate([self.d, Q.d]))
@@ -341,7 +346,10 @@ class HPolytope(Rows):
         """
         return type(self)(*pontryagin_difference(self, same_space(self, Q)))
 
-    def project(self, keep: Sequence[int], method: str = "auto", max_rows: int = 20_000, outer: bool = False) -> Self:
+    @options_by_name
+    def project(
+        self, keep: Sequence[int], *, method: str = "auto", max_rows: int = 20_000, outer: bool = False
+    ) -> Self:
         """Projection ``{x_keep : x in P}``, exact, on the coordinates `keep` in their order.
 
         Equalities are solved for the other coordinates first, in rationals.
@@ -392,7 +400,7 @@ class HPolytope(Rows):
         return minimal.with_rows(*reduction.reduced_rows(minimal, most))
 
     def outer_template(self, directions: ArrayLike) -> Self:
-        """Smallest set ``{x : T x <= h}`` with the given normals (k, n) that contains this one.
+        """Smallest set ``{x : T x <= h}`` that contains this one, T being the directions (k, n).
 
         Normals along which this set is unbounded are left out; offsets are exact or rounded outward (see
         `upper_supports`).  One program a normal.
@@ -402,7 +410,8 @@ class HPolytope(Rows):
             return type(self).empty(self.dim)
         return type(self)(*outer_template(self, normals))
 
-    def plot(self, ax: Any = None, dims: Sequence[int] = (0, 1), **style: Any) -> list[Any]:
+    @options_by_name
+    def plot(self, ax: Any = None, *, dims: Sequence[int] = (0, 1), **style: Any) -> list[Any]:
         """Draw the projection on two or three coordinates; returns the matplotlib artists.
 
         An unbounded set is cut at a box, a flat one is a face, a line or a point, and the empty set draws nothing.

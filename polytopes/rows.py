@@ -79,7 +79,7 @@ class Rows:
         return exact_generators(self.A, self.b, self.C, self.d, self.program)
 
     def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
-        """The same equalities with other inequalities."""
+        """The same equalities with other inequalities ``A x <= b``: A (m, n), b (m,)."""
         return type(self)(A, b, self.C, self.d)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, real_array
 
 __all__ = ["DetectionIndices", "FirstAlarm", "detection_indices", "first_true", "isolation_indices", "judge_alarm"]
@@ -82,10 +83,12 @@ def first_true(decision: NDArray[np.bool_]) -> int | None:
     return int(np.argmax(decision)) if decision.any() else None
 
 
+@options_by_name
 def detection_indices(
     time: ArrayLike,
     decision: ArrayLike,
     t_from: float,
+    *,
     t_on: float | None = None,
     t_hor: float | None = None,
 ) -> DetectionIndices:
@@ -137,11 +140,13 @@ def detection_indices(
     )
 
 
+@options_by_name
 def isolation_indices(
     time: ArrayLike,
     isolated: Sequence[str | None],
     faults: Sequence[str],
     t_from: float,
+    *,
     t_on: float | None = None,
     t_hor: float | None = None,
 ) -> dict[str, DetectionIndices]:
@@ -169,7 +174,9 @@ def isolation_indices(
     if unknown:
         raise ValueError(f"isolated names {', '.join(unknown)}; expected None or one of {', '.join(faults)}")
     return {
-        fault: detection_indices(time, np.array([name == fault for name in names], dtype=bool), t_from, t_on, t_hor)
+        fault: detection_indices(
+            time, np.array([name == fault for name in names], dtype=bool), t_from, t_on=t_on, t_hor=t_hor
+        )
         for fault in faults
     }
 

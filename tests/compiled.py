@@ -41,7 +41,11 @@ def detectors() -> None:
     certain = MODEL.replace(uncertainties=[])
     log = certain.simulate([0.0], np.zeros((5, 1)), np.random.default_rng(0))
     model = GaussianModel(certain, START)
-    for detector in (InnovationFilter(model), MultipleModelFilter({"a": model, "b": model}), ParitySpace(model, 2)):
+    for detector in (
+        InnovationFilter(model),
+        MultipleModelFilter({"a": model, "b": model}),
+        ParitySpace(model, order=2),
+    ):
         detector.run(log)
 
 

@@ -142,7 +142,9 @@ class Elevator:
 
     def characterise(self, records: Sequence[Log]) -> NoiseCharacterization:
         """The noise of fault-free records, with the paper's safety factor and a window of 2 s."""
-        return NoiseCharacterization.from_records([self.residual(r) for r in records], QBAR, SAFETY_FACTOR)
+        return NoiseCharacterization.from_records(
+            [self.residual(r) for r in records], QBAR, safety_factor=SAFETY_FACTOR
+        )
 
     def interval_detectors(self, noise: NoiseCharacterization, first_command: float) -> dict[str, IntervalDetector]:
         """The paper's detectors, one for each pole of the residual filter, named as in Table 1."""

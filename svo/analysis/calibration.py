@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.analysis.elastic_bounds import Bound, bounds_of
 from svo.analysis.elastic_program import ElasticProgram, Explained
 from svo.analysis.explanation import NEGLIGIBLE, explain
@@ -73,12 +74,13 @@ class Calibration:
     smallest: bool
 
 
+@options_by_name
 def calibrate(
     model: UncertainModel,
     log: Log,
     initial: HPolytope,
-    bounds: Sequence[str] = ("noise", "disturbances"),
     *,
+    bounds: Sequence[str] = ("noise", "disturbances"),
     window: int = 1000,
 ) -> Calibration:
     """Find which bounds of a model are too narrow for a log without faults, by how much, and where.

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.analysis.model_pair import ModelPair, PairSolution, Witness
 from svo.models.model import UncertainModel
 
@@ -45,6 +46,7 @@ class Distinguishability:
     witness: Witness | None
 
 
+@options_by_name
 def distinguishability(
     plant_model: UncertainModel,
     observer_model: UncertainModel,

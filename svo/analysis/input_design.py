@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.model_pair import LEAST_SEPARATION, ModelPair
 from svo.checks import Array, finite_array, is_finite_number, listed
@@ -67,6 +68,7 @@ class InputDesign:
         return max(horizons) if self.checks and len(horizons) == len(self.checks) else None
 
 
+@options_by_name
 def design_input(
     plant_model: UncertainModel,
     observer_models: UncertainModel | Sequence[UncertainModel],

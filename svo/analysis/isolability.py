@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from inspect import signature
 from itertools import islice
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,7 +17,19 @@ from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers.base import Observer
-from svo.plant import HEALTHY, Plant, StatedFault, StatesFaults
+from svo.plant import HEALTHY, Plant, StatedFault
+
+
+@runtime_checkable
+class StatesFaults(Protocol):
+    """What a `Plant` offers besides if it can tell, before a study, which faults its bank can isolate."""
+
+    def stated_faults(self, noise: str, size: float = 1.0) -> Mapping[str, StatedFault]:
+        """Each fault at ``size`` times that of its first profile, with the bounds of a noise set.
+
+        A plant may leave ``size`` out; then only the full size can be asked for.
+        """
+        ...
 
 
 @dataclass(frozen=True)

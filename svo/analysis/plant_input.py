@@ -6,15 +6,28 @@ import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.input_design import InputDesign, design_input
 from svo.analysis.isolability import FaultFreeFlight, horizon_text, stated_faults
-from svo.checks import finite_array
-from svo.plant import LimitsInputs, Plant
+from svo.checks import Array, finite_array
+from svo.plant import Plant
+
+
+@runtime_checkable
+class LimitsInputs(Protocol):
+    """What a `Plant` offers besides if inputs can be designed for it.
+
+    Attributes
+    ----------
+    input_limits : (lower, upper)
+        Bounds of the inputs, each (nu,), in the units of `Columns.inputs`.
+    """
+
+    input_limits: tuple[Array, Array]
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.signatures import options_by_name
 from svo.baselines.filter_kernel import filter_samples
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, Sample
 from svo.checks import Array, finite_array, readings
@@ -40,6 +41,7 @@ class Innovations:
         return np.einsum("ki,ki->k", self.white, self.white)
 
 
+@options_by_name
 @dataclass(frozen=True)
 class InnovationFilter:
     """Kalman filter; with ``state_input`` or ``output_input`` an unknown-input observer of least variance.
@@ -66,6 +68,7 @@ class InnovationFilter:
     """
 
     model: GaussianModel
+    _: KW_ONLY
     process_noise: float = 1.0
     state_input: ArrayLike | None = None
     output_input: ArrayLike | None = None
@@ -82,7 +85,7 @@ class InnovationFilter:
         object.__setattr__(self, "_D", np.hstack([none[1], D]))
         if self._E.shape[1]:
             typical = self.model.sample(np.zeros(self.model.model.n_inputs), self.model.model.schedule)
-            unknown_input_exists(typical.A, typical.C, E, D)
+            unknown_input_exists(typical.A, typical.C, E, D=D)
 
     def run(self, log: Log) -> Innovations:
         """All samples of a log.

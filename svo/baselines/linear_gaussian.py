@@ -93,7 +93,7 @@ class GaussianModel:
             )
 
     def sample(self, u: Array, schedule: Any) -> Sample:
-        """The model at one sample, driven by u (nu,)."""
+        """The model at one sample, driven by u (nu,), at its value of the schedule or None."""
         bounds = tuple(bound[None] for bound in self.model.bounds(schedule))
         return Sample(*(part[0] for part in self._over(u[None], self.model.stack(schedule)[None], bounds)))
 
@@ -139,7 +139,7 @@ class GaussianModel:
 
 
 def fault_effect(nominal: GaussianSamples, faulty: GaussianSamples, x: Array) -> tuple[Array, Array]:
-    """What a fault of the size in ``faulty`` adds to the next state (K, n) and to the output (K, ny), at states x."""
+    """What ``faulty`` adds to ``nominal`` in the next state (K, n) and in the output (K, ny), at states x (K, n)."""
     state = np.einsum("kij,kj->ki", faulty.A - nominal.A, x) + faulty.f - nominal.f
     output = np.einsum("kij,kj->ki", faulty.C - nominal.C, x) + faulty.g - nominal.g
     return state, output

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
+from polytopes.signatures import options_by_name
 from svo.baselines.filter_kernel import multiple_models
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
 from svo.checks import Array
@@ -15,13 +16,14 @@ from svo.logs.log import Log
 
 @dataclass(frozen=True)
 class ModelProbabilities:
-    """Over K samples: posterior (K, m) of each model, and log_odds (K,) of all but the first one together."""
+    """Over K samples: posterior (K, m) of the models, by ``names``, and log_odds (K,) of all but the first together."""
 
     names: tuple[str, ...]
     posterior: Array
     log_odds: Array
 
 
+@options_by_name
 @dataclass(frozen=True)
 class MultipleModelFilter:
     """One Kalman filter a model, and the probability of each (Blom and Bar-Shalom 1988).
@@ -43,6 +45,7 @@ class MultipleModelFilter:
     """
 
     models: Mapping[str, GaussianModel]
+    _: KW_ONLY
     switching: float = 1e-3
     process_noise: float = 1.0
 
@@ -67,7 +70,7 @@ class MultipleModelFilter:
         return self.over([model.samples(log) for model in self.models.values()])
 
     def over(self, samples: list[GaussianSamples]) -> ModelProbabilities:
-        """The same where the models along the log are known already, in the order of the models."""
+        """The same where ``samples``, the models along the log in the order of `models`, are known already."""
         m, K = len(samples), len(samples[0])
         first = next(iter(self.models.values()))
         xs = np.repeat(first.mean[None], m, axis=0)

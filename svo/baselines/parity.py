@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from polytopes.signatures import options_by_name
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
 from svo.logs.log import Log
 
@@ -35,6 +36,7 @@ class ParityRecord:
     degrees: int
 
 
+@options_by_name
 @dataclass(frozen=True)
 class ParitySpace:
     """Residuals of the last order + 1 measurements that no state can make.
@@ -58,6 +60,7 @@ class ParitySpace:
 
     model: GaussianModel
     order: int = 4
+    _: KW_ONLY
     process_noise: float = 1.0
 
     def __post_init__(self) -> None:

@@ -44,7 +44,8 @@ def detect(
         from svo.detection.alarm_folder import check_no_results
         from svo.detection.detect import detect as run_detection
         from svo.detection.detect import write_detection
-        from svo.plant import DetectsThresholds, in_architecture
+        from svo.detection.thresholds import DetectsThresholds
+        from svo.plant import in_architecture
         from svo.plant.description import check_kept_description, find_plant, keep_description
 
         if out is not None:

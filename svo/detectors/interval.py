@@ -45,7 +45,7 @@ class IntervalThreshold(ThresholdDetector):
 
     def learn(self, parameters: Mapping[str, float], healthy: Sequence[Any]) -> Mapping[str, Array]:
         residuals = [prediction.residual for prediction in healthy]
-        return {"bounds": NoiseCharacterization.from_records(residuals, self.qbar, 1.0 + _HAIR).bounds}
+        return {"bounds": NoiseCharacterization.from_records(residuals, self.qbar, safety_factor=1.0 + _HAIR).bounds}
 
     def scores(self, setting: Setting, prepared: IntervalPrediction) -> Array:
         filtered = first_order_filter(prepared.residual, self.pole)

@@ -47,7 +47,7 @@ class ResidualTestDetector(ThresholdDetector):
         channels = []
         for i, innovation in enumerate(prepared.T):
             whitening = Whitening(
-                float(learned["mean"][i]), float(learned["sigma"][i]), tuple(learned["coefficients"][i])
+                float(learned["mean"][i]), float(learned["sigma"][i]), coefficients=tuple(learned["coefficients"][i])
             )
             channels.append(self.channel_scores(setting.parameters, whitening.apply(innovation)))
         return np.max(channels, axis=0)

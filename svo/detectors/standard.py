@@ -45,7 +45,7 @@ class KalmanChiSquare(ThresholdDetector):
         return Evaluated(self.model.samples(log))
 
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
-        filter_ = InnovationFilter(self.model, setting.parameters["process_noise"])
+        filter_ = InnovationFilter(self.model, process_noise=setting.parameters["process_noise"])
         return window_sums(filter_.over(prepared.nominal).squares, setting.parameters["samples"])
 
 
@@ -88,7 +88,9 @@ class MultipleModels(StatedFaults):
 
     def _filter(self, setting: Setting) -> MultipleModelFilter:
         models = {"nominal": self.model, **self.stated}
-        return MultipleModelFilter(models, setting.parameters["switching"], setting.parameters["process_noise"])
+        return MultipleModelFilter(
+            models, switching=setting.parameters["switching"], process_noise=setting.parameters["process_noise"]
+        )
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ class ParityTest(StatedFaults):
         return Detection(alarm, the_only_explanation(found.unexplained, setting.level, alarm))
 
     def _space(self, setting: Setting) -> ParitySpace:
-        return ParitySpace(self.model, int(setting.parameters["order"]))
+        return ParitySpace(self.model, order=int(setting.parameters["order"]))
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ class UnknownInputBank(StatedFaults):
         return Detection(alarm, the_only_explanation(np.array(sums).T, setting.level, alarm))
 
     def _filter(self, setting: Setting) -> InnovationFilter:
-        return InnovationFilter(self.model, setting.parameters["process_noise"])
+        return InnovationFilter(self.model, process_noise=setting.parameters["process_noise"])
 
 
 def the_only_explanation(scores: Array, level: float, alarm: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, finite_array, is_count, is_finite_number
 from svo.faults.blocks import (
     channels,
@@ -46,6 +47,7 @@ class ActuatorLaw:
     upper: Array
 
 
+@options_by_name
 @dataclass(frozen=True)
 class ActuatorFault:
     """A fault of one actuator, or of several that fail together. Inputs are ABSOLUTE (trim included).
@@ -101,6 +103,7 @@ class ActuatorFault:
     kind: ActuatorKind
     magnitude: float | None
     profile: Profile
+    _: KW_ONLY
     travel: tuple[float, float] | None = None
     frequency_hz: float | None = None
     seed: int | None = None

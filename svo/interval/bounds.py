@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, real_array
 
 
+@options_by_name
 @dataclass(frozen=True, slots=True)
 class GainBounds:
     """Intervals of g and h in x+ = g x + (1 - g) h u, at one sample or at K samples.
@@ -34,6 +36,7 @@ class GainBounds:
     gr: float | Array
     hc: float | Array = 1.0
     hr: float | Array = 0.0
+    _: KW_ONLY
     slope: float | Array = 0.0
     limit: float | Array = inf
     samples: int | None = field(init=False, repr=False)
@@ -84,8 +87,8 @@ class GainBounds:
             return self
         if sample >= self.samples:
             raise ValueError(f"the gain bounds have {self.samples} samples; expected more, for sample {sample}")
-        values = (getattr(self, name) for name in ("gc", "gr", "hc", "hr", "slope", "limit"))
-        return GainBounds(*(v if isinstance(v, float) else float(v[sample]) for v in values))
+        values = {name: getattr(self, name) for name in ("gc", "gr", "hc", "hr", "slope", "limit")}
+        return GainBounds(**{name: v if isinstance(v, float) else float(v[sample]) for name, v in values.items()})
 
 
 GainLaw = Callable[[Any, Any, Any], GainBounds]

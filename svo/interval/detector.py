@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.checks import Array, real_array
 from svo.interval.bounds import GainBounds
 from svo.interval.noise import NoiseCharacterization
@@ -192,7 +193,8 @@ class IntervalDetector:
         self.predictor.step(_number("u", u), self._held, self._schedule)
         return self._judge(measured, schedule, begun)
 
-    def run(self, log: Log, initial: tuple[float, float] | None = None) -> IntervalRecord:
+    @options_by_name
+    def run(self, log: Log, *, initial: tuple[float, float] | None = None) -> IntervalRecord:
         """All samples of a log with one input and one output, at compiled speed; the online state is left alone.
 
         The answers are those of `update` and `step` on a fresh detector.
@@ -203,7 +205,7 @@ class IntervalDetector:
         initial : (center, radius), optional
             Interval of the state at the log's first sample; that of the predictor by default.
         """
-        prediction = self.predictor.predict(log, initial)
+        prediction = self.predictor.predict(log, initial=initial)
         residual = prediction.residual
         filtered = first_order_filter(residual, self.pole)
         counted = np.cumsum(~np.isnan(residual)) - 1

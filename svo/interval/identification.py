@@ -97,7 +97,7 @@ def identify_first_order(
     radii[1] += abs(_one_step_fit(whole)[1] - centre[1])
     error = max(float(np.nanmax(np.abs(_simulation_error(u, y, *centre)))) for u, y in whole)
     (gc, hc), (gr, hr) = (units * centre).tolist(), (units * radii).tolist()
-    return FirstOrderFit(GainBounds(gc, gr, hc, hr), units * fits, len(pieces) - len(fits), y_unit * error)
+    return FirstOrderFit(GainBounds(gc, gr, hc=hc, hr=hr), units * fits, len(pieces) - len(fits), y_unit * error)
 
 
 def _power_of_two(size: float) -> float:

@@ -117,7 +117,7 @@ class FirstOrderScheduler:
         }
 
     def load_state_dict(self, state: Mapping[str, Array]) -> None:
-        """Go on from what `state_dict` gave."""
+        """Go on from ``state``, what `state_dict` gave."""
         if not state:
             return
         self._first, self._held = float(state["first"]), float(state["held"])

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.signatures import options_by_name
 from svo.checks import real_array
 from svo.interval.power_law import DEFAULT_EXPONENTS, PowerLaw, smallest_power_law
 from svo.interval.thresholds import checked_bounds, threshold_sequence
@@ -70,8 +71,9 @@ class NoiseCharacterization:
         object.__setattr__(self, "bounds", checked_bounds(self.bounds))
 
     @classmethod
+    @options_by_name
     def from_records(
-        cls, records: ArrayLike | Sequence[ArrayLike], qbar: int, safety_factor: float = 1.2
+        cls, records: ArrayLike | Sequence[ArrayLike], qbar: int, *, safety_factor: float = 1.2
     ) -> NoiseCharacterization:
         """lambda_q = safety_factor times the largest size of a mean of q samples in all records, full windows only.
 
@@ -126,11 +128,11 @@ class NoiseCharacterization:
         return CharacterizationCheck(moving_average_extremes(_signals(records), self.qbar), self.bounds)
 
     def thresholds(self, pole: float) -> Array:
-        """Thresholds tau_k of the filtered signal, (qbar + 1,), for k = 0..qbar; constant from qbar on (11)-(13)."""
+        """Thresholds tau_k (qbar + 1,), k = 0..qbar, of the signal filtered with this pole, constant then (11)-(13)."""
         return threshold_sequence(self.bounds, pole)
 
     def power_law(self, exponents: ArrayLike = DEFAULT_EXPONENTS) -> PowerLaw:
-        """The smallest alpha q^gamma + beta that is nowhere below lambda_q; see `smallest_power_law`."""
+        """The least alpha q^gamma + beta above all lambda_q, gamma of the exponents (k,); see `smallest_power_law`."""
         return smallest_power_law(self.bounds, exponents)
 
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, is_finite_number, real_number
 from svo.interval import kernel
 from svo.interval.bounds import GainBounds, GainLaw
@@ -149,9 +150,9 @@ class IntervalPredictor:
         return self._interval
 
     def transition(self, u: float, y: float | None = None, schedule: Any = None) -> tuple[Interval, GainBounds]:
-        """As `step`, and also the bounds of g and h that were used, with the radius of g worked out."""
+        """As `step` of u, y and schedule, and also the bounds of g and h that were used, the radius of g worked out."""
         gains, used = self._advance(u, y, schedule)
-        return self._interval, GainBounds(gains.gc, used, gains.hc, gains.hr)
+        return self._interval, GainBounds(gains.gc, used, hc=gains.hc, hr=gains.hr)
 
     def _advance(self, u: float, y: float | None, schedule: Any) -> tuple[GainBounds, float]:
         if not isinstance(u, float):
@@ -170,7 +171,8 @@ class IntervalPredictor:
         self._sample += 1
         return gains, used
 
-    def predict(self, log: Log, initial: tuple[float, float] | None = None) -> IntervalPrediction:
+    @options_by_name
+    def predict(self, log: Log, *, initial: tuple[float, float] | None = None) -> IntervalPrediction:
         """The prediction over a log with one input and one output; `step` and its sample are left alone.
 
         Parameters

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, real_array
 from svo.interval.residual import check_pole
 
 _EPS, _SMALLEST = float(np.finfo(float).eps), float(np.finfo(float).smallest_subnormal)
 
 
+@options_by_name
 def filter_bound(
     bounds: ArrayLike, pole: float, *, r: int, mu: float, gain: float | None = None, output_gain: float = 1.0
 ) -> float:
@@ -49,7 +51,8 @@ def filter_bound(
 def threshold_sequence(bounds: ArrayLike, pole: float) -> Array:
     """tau_k for k = 0..qbar, (qbar + 1,): the bound of a filter of static gain one that starts at its first input.
 
-    Corollary 2: `filter_bound` with b = 1 - a, c = 1, r = k and mu = lambda_1. From k = qbar on it is constant (13).
+    Corollary 2: `filter_bound` with b = 1 - a, c = 1, r = k and mu = lambda_1; the bounds are lambda_q (qbar,), the
+    pole is a. From k = qbar on it is constant (13).
 
     Rounded outward: a signal of floats whose means are at most lambda_q, as `NoiseCharacterization.check` finds them,
     stays at or below it in `first_order_filter`, which computes in floats too. For that each tau_k is larger by at most

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.isolation.bank import Bank, falsified_and_undecided, largest_at
 from svo.isolation.bank_checks import by_name, check_counts
@@ -58,10 +59,12 @@ class ArchitectureI(Bank):
         or sampling time (in states, if observers can start again), or a count below one.
     """
 
+    @options_by_name
     def __init__(
         self,
         nominal: Observer,
         faults: Mapping[str, Observer],
+        *,
         debounce: int = 1,
         recovery: int | None = None,
         timeout: int | None = None,
@@ -155,11 +158,13 @@ class ArchitectureII(Bank):
         below one.
     """
 
+    @options_by_name
     def __init__(
         self,
         nominal: Observer,
         faults: Mapping[str, Observer],
         global_: Observer | HPolytope,
+        *,
         class_one: Collection[str] = (),
         debounce: int = 1,
         recovery: int | None = None,

@@ -46,7 +46,16 @@ class Bank(ABC):
     # -- samples -----------------------------------------------------------------------------------
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Verdict:
-        """The first measurement, without a transition; ``u`` where an observer needs it.
+        """The first measurement, without a transition.
+
+        Parameters
+        ----------
+        y0 : (ny,) array
+            NaN for a missing sensor.
+        u : (nu,) array, optional
+            The input from this sample on, where an observer needs it (as `step` needs ``u_next``).
+        schedule : optional
+            Scheduling value of this sample; needed if an observer's model has a schedule.
 
         Raises
         ------
@@ -71,6 +80,14 @@ class Bank(ABC):
 
         Parameters
         ----------
+        u : (nu,) array
+            Drove the plant from the sample before to this one.
+        y : (ny,) array
+            NaN for a missing sensor.
+        u_next : (nu,) array, optional
+            The input from this sample on; needed if the output of an observer's model depends on it.
+        schedule : optional
+            Scheduling value of this sample; needed if an observer's model has a schedule.
         deadline : float, optional
             Seconds for all observers together. They are stepped in the order of the bank, and each may take an equal
             share of what is left; one that is done early leaves its time to those behind it. Sets may be wider and

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, readings, real_array
 from svo.logs import frames
 from svo.logs.columns import checked_parts
 from svo.logs.names import Columns
 
 
+@options_by_name
 @dataclass(frozen=True, eq=False)
 class Log:
     """Samples of one run; row k holds what is known of time ``time[k]``.
@@ -35,6 +37,7 @@ class Log:
     time: Array
     u: Array
     y: Array
+    _: KW_ONLY
     x: Array | None = None
     schedule: Array | None = field(default=None)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
+
+from polytopes.signatures import options_by_name
 
 
 @dataclass(frozen=True)
@@ -13,11 +15,13 @@ class Column:
     unit: str
 
 
+@options_by_name
 @dataclass(frozen=True)
 class Columns:
-    """Column names of a log: time in seconds, then the channels in the model's order and units."""
+    """Column names of a log: time [s], then inputs, outputs and states in the model's order and units."""
 
     inputs: tuple[Column, ...]
     outputs: tuple[Column, ...]
     states: tuple[Column, ...] = ()
+    _: KW_ONLY
     time: str = "time_s"

@@ -11,7 +11,7 @@ Engineering Practice 21 (2013), equations (1) and (8), are the case without a, c
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.checks import Array, finite_array, listed, positive_number
 from svo.logs.log import Log
 from svo.models.bounds import Bounds, bounds_of
@@ -37,6 +38,7 @@ __all__ = ["UncertainModel", "Uncertainty"]
 _TYPICAL = -1.0  # the sample before the first stands for the typical schedule, at which observers choose their rows
 
 
+@options_by_name
 @dataclass(frozen=True, eq=False)
 class UncertainModel:
     """An uncertain linear (parameter-varying) model in discrete time.
@@ -84,9 +86,10 @@ class UncertainModel:
     A: Schedulable
     B: Schedulable
     C: Schedulable
+    _: KW_ONLY
+    D: Schedulable = None
     E: Schedulable = None
     w: Any = None
-    D: Schedulable = None
     F: Schedulable = None
     n: Schedulable = None
     a: Schedulable = None
@@ -158,7 +161,7 @@ class UncertainModel:
     # -- evaluation ----------------------------------------------------------------------------
 
     def stack(self, schedule: Any = None) -> Array:
-        """All matrices at one sample.
+        """All matrices at one sample, whose scheduling value is ``schedule``.
 
         Returns
         -------
@@ -185,11 +188,11 @@ class UncertainModel:
         return self._stack.over(schedule)
 
     def bounds(self, schedule: Any = None) -> tuple[Array, Array, Array]:
-        """Disturbance bounds (nw,), (nw,) and noise half-width (ny,) at one sample."""
+        """Disturbance bounds (nw,), (nw,) and noise half-width (ny,) at one sample, from its value of the schedule."""
         return self._bounds.at(schedule)
 
     def bounds_over(self, schedule: ArrayLike) -> tuple[Array, Array, Array]:
-        """`bounds` at many samples (K, nw), (K, nw), (K, ny); functions are asked as `stack_over` asks them."""
+        """`bounds` over a schedule (K, ...): (K, nw), (K, nw), (K, ny); functions are asked as by `stack_over`."""
         return self._bounds.over(schedule)
 
     def along(self, schedule: ArrayLike | None) -> UncertainModel:
@@ -228,14 +231,18 @@ class UncertainModel:
         tabled = [replace(item, **of) for item, of in zip(self.uncertainties, others, strict=True)]
         return self.replace(**changes, uncertainties=tabled)
 
-    def block(self, name: str, schedule: Any = None, uncertainty: int | None = None) -> Array:
-        """One matrix by its name ("A", "B", ...), of the model or of one of its uncertainties."""
+    @options_by_name
+    def block(self, name: str, schedule: Any = None, *, uncertainty: int | None = None) -> Array:
+        """One matrix by its name ("A", "B", ...) at a value of the schedule.
+
+        It is that of the model, or that of an ``uncertainty``, counted from 0.
+        """
         rows, cols = self.layout.block(name)
         value = self.stack(schedule)[0 if uncertainty is None else uncertainty + 1, rows, cols]
         return value[:, 0] if name in "ac" else value
 
     def replace(self, **changes: Any) -> UncertainModel:
-        """A copy with some arguments changed, checked again; arrays are those of discrete time."""
+        """A copy with ``changes`` of arguments by name, checked again; arrays are those of discrete time."""
         if self.origin is not None:
             changes = {"origin": self.origin.after(changes)} | changes
         return replace(self, **changes)
@@ -250,6 +257,7 @@ class UncertainModel:
     # -- construction from other forms -----------------------------------------------------------
 
     @classmethod
+    @options_by_name
     def from_continuous(
         cls,
         A: ArrayLike,
@@ -275,7 +283,7 @@ class UncertainModel:
 
         Parameters
         ----------
-        A, B, C, and the other arguments of `UncertainModel`
+        A, B, C, and in ``rest`` the other arguments of `UncertainModel`
             Those of the state equation in continuous time, and constant.
         Ts : float
             Sampling time [s].
@@ -298,27 +306,45 @@ class UncertainModel:
         return made
 
     @classmethod
+    @options_by_name
     def from_statespace(cls, sys: Any, *, Ts: float | None = None, **rest: Any) -> UncertainModel:
         """From a ``control.StateSpace``, a system of ``scipy.signal``, or an object with A, B, C, D and dt.
 
         A continuous system (dt = 0; `scipy.signal.lti`) is discretised with ``Ts``; a discrete one keeps its dt, or
         has the sampling time ``Ts`` if its dt is True. One that leaves open which it is (dt = None) is refused.
         A transfer function of scipy is realised first (`to_ss`).
+
+        Parameters
+        ----------
+        sys : the system
+        Ts : float, optional
+            Sampling time [s].
+        rest
+            Further arguments of `UncertainModel`, or of `from_continuous` for a continuous system.
         """
         found = state_space(sys, Ts)
         make = cls.from_continuous if found.is_continuous else cls
         return make(found.A, found.B, found.C, D=found.D, Ts=found.Ts, **rest)
 
     @classmethod
+    @options_by_name
     def from_mat(cls, path: str | Path, *, Ts: float, **rest: Any) -> UncertainModel:
         """From the variables A, B, C, ... of a MAT file; see `svo.models.mat.read_arrays`.
 
-        ``rest`` are further arguments, such as ``uncertainties``; the matrices are those of discrete time.
+        Parameters
+        ----------
+        path : path of a MAT file up to version 7.2
+            Its matrices are those of discrete time.
+        Ts : float
+            Sampling time [s].
+        rest
+            Further arguments, such as ``uncertainties``.
         """
         return cls(**{"B": None} | read_model(path, rest) | rest, Ts=Ts)
 
     # -- simulation ------------------------------------------------------------------------------
 
+    @options_by_name
     def simulate(
         self,
         x0: ArrayLike,

@@ -85,7 +85,7 @@ class ScheduleTable:
         return result
 
     def has_points_of(self, other: ScheduleTable) -> bool:
-        """Whether both are tabulated over the same points."""
+        """Whether this table and the ``other`` are over the same points."""
         return self._knots == other._knots
 
     @classmethod

@@ -8,17 +8,19 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from polytopes.signatures import options_by_name
 from svo.checks import finite_array
 
 Schedulable = ArrayLike | Callable[[Any], ArrayLike] | None
 
 
-@dataclass(frozen=True, eq=False)
+@options_by_name
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Uncertainty:
     """One Delta and the directions that it scales: any of A, B, a, E (state) and C, D, c, F (output).
 
     ``bounds`` = (lo, hi) are used as given, never recentred. Each array is constant, a function of the
-    schedule, or None (zero).
+    schedule, or None (zero). ``name`` is what messages and ``varying`` call it.
     """
 
     A: Schedulable = None

@@ -237,7 +237,7 @@ class Observer(ABC):
         return self._answered(self._late_update(outputs, int(sample)), begun)
 
     def check_late(self, y: ArrayLike, sample: int) -> None:
-        """Raise what `late_update` would raise; nothing changes."""
+        """Raise what `late_update` of y (ny,), measured at ``sample``, would raise; nothing changes."""
         self._late_outputs(y, sample)
 
     @property

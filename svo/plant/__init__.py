@@ -3,21 +3,21 @@
 Descriptions of plants in TOML are in `svo.plant.description`.
 """
 
+from importlib import import_module
+from typing import Any
+
 from svo.logs.names import Column, Columns
 from svo.plant.protocol import (
     HEALTHY,
     AddsExhibits,
     ComparesDetectors,
-    DetectsThresholds,
     Distribution,
     Exhibit,
-    LimitsInputs,
     MonitoredPlant,
     OffersArchitectures,
     Plant,
     Reference,
     StatedFault,
-    StatesFaults,
     TimesFaults,
     architecture_of,
     fault_start,
@@ -66,3 +66,16 @@ __all__ = [
     "saved_schedule",
     "schedule_of",
 ]
+
+# Capabilities that a plant may have are declared beside what asks for them; their names are still found here.
+_BESIDE_THEIR_USE = {
+    "DetectsThresholds": "svo.detection.thresholds",
+    "LimitsInputs": "svo.analysis.plant_input",
+    "StatesFaults": "svo.analysis.isolability",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _BESIDE_THEIR_USE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_BESIDE_THEIR_USE[name]), name)

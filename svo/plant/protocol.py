@@ -23,7 +23,6 @@ from svo.plant.scheduling import Scheduler
 
 if TYPE_CHECKING:
     from svo.detectors.detector import Detector
-    from svo.interval.on_log import ThresholdDetection
 
 HEALTHY = "none"
 Distribution = Literal["bounded", "gaussian"]
@@ -31,7 +30,10 @@ Distribution = Literal["bounded", "gaussian"]
 
 @dataclass(frozen=True)
 class Reference:
-    """What a paper reports for one fault and profile, as it is to be printed (seconds; "-" where silent)."""
+    """What a paper reports for one fault and profile, as it is to be printed: times to ``detect`` and ``isolate`` it.
+
+    In seconds, "-" where it is silent.
+    """
 
     detect: str
     isolate: str
@@ -68,7 +70,7 @@ class MonitoredPlant(Protocol):
     def columns(self) -> Columns: ...
 
     def bank(self, noise: str) -> Bank:
-        """A fresh isolation bank."""
+        """A fresh isolation bank for the bounds of the noise set ``noise``."""
         ...
 
     def scheduler(self) -> Scheduler:
@@ -111,15 +113,28 @@ class Plant(Protocol):
     reference_title: str
 
     def duration(self, fault: str, profile: str) -> float:
-        """Length of a run [s]; ``fault`` may be "none"."""
+        """Length of a run with a profile of a fault [s]; ``fault`` may be "none"."""
         ...
 
     def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
-        """One run with its true states; ``fault`` may be "none". The log carries the schedule of `scheduler`."""
+        """One run with its true states; the log carries the schedule of `scheduler`.
+
+        Parameters
+        ----------
+        fault, profile : str
+            As in `faults`, or "none" for a healthy run.
+        noise : str
+            One of `noise_sets`, whose bounds noise and disturbances keep.
+        seed : int or numpy.random.SeedSequence
+            The same seed gives the same log.
+        """
         ...
 
     def bank(self, noise: str) -> Bank:
-        """A fresh isolation bank; its fault observers are named as in `faults`."""
+        """A fresh isolation bank for the bounds of a noise set; its fault observers are named as in `faults`.
+
+        ``noise`` is one of `noise_sets`.
+        """
         ...
 
     def scheduler(self) -> Scheduler:
@@ -141,31 +156,6 @@ class StatedFault:
 
     description: str
     model: UncertainModel
-
-
-@runtime_checkable
-class StatesFaults(Protocol):
-    """What a `Plant` offers besides if it can tell, before a study, which faults its bank can isolate."""
-
-    def stated_faults(self, noise: str, size: float = 1.0) -> Mapping[str, StatedFault]:
-        """Each fault at ``size`` times that of its first profile, with the bounds of a noise set.
-
-        A plant may leave ``size`` out; then only the full size can be asked for.
-        """
-        ...
-
-
-@runtime_checkable
-class LimitsInputs(Protocol):
-    """What a `Plant` offers besides if inputs can be designed for it.
-
-    Attributes
-    ----------
-    input_limits : (lower, upper)
-        Bounds of the inputs, each (nu,), in the units of `Columns.inputs`.
-    """
-
-    input_limits: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @runtime_checkable
@@ -213,18 +203,9 @@ def in_architecture(plant: Any, architecture: str | None) -> Any:
     return plant.with_architecture(architecture)
 
 
-@runtime_checkable
-class DetectsThresholds(Protocol):
-    """What a `MonitoredPlant` offers besides if an interval detector runs beside its bank."""
-
-    def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
-        """What that detector says about a log; None if there is none after all."""
-        ...
-
-
 @dataclass(frozen=True)
 class Exhibit:
-    """A picture that a plant adds to its study, and what it shows."""
+    """A picture that a plant adds to its study: its ``path``, and what it shows as ``title`` and ``caption``."""
 
     path: Path
     title: str
@@ -236,7 +217,10 @@ class AddsExhibits(Protocol):
     """What a `Plant` offers besides if its study has more to show than the bank's times to detect and isolate."""
 
     def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
-        """Run the additional part of a study, write tables and pictures into its folder, return the pictures."""
+        """Run the additional part of a study, write tables and pictures into its folder, return the pictures.
+
+        ``runs``, ``seed`` and the noise sets ``noise`` are those of the study.
+        """
         ...
 
 
@@ -257,7 +241,10 @@ def fault_start(plant: Plant, fault: str, profile: str) -> float:
 
 
 def first_faulty_sample(plant: Plant, fault: str, profile: str, time: NDArray[np.float64]) -> int:
-    """Index of the first of a run's samples (K,), at these times [s], at which a fault acts; K without a fault."""
+    """Index of the first sample of a run of a plant at which a fault acts; K without a fault.
+
+    ``profile`` is that of the fault, ``time`` (K,) the times of the run's samples [s].
+    """
     if fault == HEALTHY:
         return len(time)
     return round((fault_start(plant, fault, profile) - float(time[0])) / plant.Ts)
@@ -276,8 +263,10 @@ class ComparesDetectors(Protocol):
     compared_faults: tuple[tuple[str, str], ...]
 
     def with_noise(self, distribution: Distribution) -> Plant:
-        """This plant with its noise drawn "bounded" (within the bounds of the noise set), or "gaussian" (the same
-        rms, unbounded); models and bounds stay as they are."""
+        """This plant with its noise drawn from a ``distribution``; models and bounds stay as they are.
+
+        "bounded" is within the bounds of the noise set, "gaussian" of the same rms and unbounded.
+        """
         ...
 
     def detectors(self, noise: str) -> Sequence[Detector]:

@@ -22,7 +22,7 @@ Scheduler = Callable[[NDArray[np.float64]], Any] | InputScheduler
 
 
 def schedule_of(scheduler: Scheduler, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
-    """The schedule of the next sample, by a filter of either kind."""
+    """The schedule of the next sample from its y (ny,) and u (nu,), by a ``scheduler`` of either kind."""
     return scheduler.with_input(y, u) if isinstance(scheduler, InputScheduler) else scheduler(y)
 
 
@@ -35,12 +35,12 @@ class SavesSchedule(Protocol):
         ...
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `state_dict` gave."""
+        """Go on from ``state``, what `state_dict` gave."""
         ...
 
 
 def saved_schedule(scheduler: Scheduler) -> dict[str, NDArray[Any]]:
-    """The state of a scheduling filter.
+    """The state of a ``scheduler``, a plant's scheduling filter.
 
     Raises
     ------
@@ -58,10 +58,10 @@ def saved_schedule(scheduler: Scheduler) -> dict[str, NDArray[Any]]:
 
 
 def resume_schedule(scheduler: Scheduler, state: Mapping[str, NDArray[Any]]) -> None:
-    """Go on from what `saved_schedule` gave."""
+    """Let a ``scheduler`` go on from ``state``, what `saved_schedule` gave."""
     if isinstance(scheduler, SavesSchedule):
         scheduler.load_state_dict(state)
 
 
 def no_schedule(y: NDArray[np.float64]) -> None:
-    """The scheduler of a plant whose model has no schedule; it has nothing to remember."""
+    """The scheduler of a plant whose model has no schedule, whatever y is; it has nothing to remember."""

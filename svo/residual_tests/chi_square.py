@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 from scipy.stats import chi2
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.residual_tests.interface import WindowTest, check_count, check_probability, row_sums
 
 
+@options_by_name
 @dataclass(frozen=True)
 class ChiSquare(WindowTest):
     """H1 where the last N squared norms of a vector residual sum to more than chance allows.
@@ -29,6 +31,7 @@ class ChiSquare(WindowTest):
     """
 
     degrees: int
+    _: KW_ONLY
     samples: int = 1
     false_alarm_rate: float = 1e-3
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.residual_tests.interface import Decision, ResidualTest, above, check_finite, check_positive
 from svo.residual_tests.run_length import LARGEST_DRIFT, LARGEST_THRESHOLD, log_run_length
@@ -14,7 +15,8 @@ from svo.residual_tests.run_length import LARGEST_DRIFT, LARGEST_THRESHOLD, log_
 _LARGEST = float(np.log(np.finfo(float).max))
 
 
-@dataclass(frozen=True)
+@options_by_name
+@dataclass(frozen=True, kw_only=True)
 class CUSUM(ResidualTest):
     """H1 where the residual has drifted off its mean, to either side, by more than the threshold.
 

@@ -13,7 +13,7 @@ from svo.checks import Array, is_finite_number, readings, real_array
 
 
 class Decision(NamedTuple):
-    """The answer at one sample: the test's statistic (NaN while there are too few samples), and its decision."""
+    """The answer at one sample: the statistic (NaN while there are too few samples), and whether it is an alarm."""
 
     statistic: float
     alarm: bool

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.residual_tests.interface import (
     Decision,
@@ -21,7 +22,8 @@ from svo.residual_tests.interface import (
 )
 
 
-@dataclass(frozen=True)
+@options_by_name
+@dataclass(frozen=True, kw_only=True)
 class GLR(WindowTest):
     """H1 where the best changed mean explains the last N residuals so much better than the fault-free one.
 
@@ -66,7 +68,8 @@ class GLR(WindowTest):
         return np.asarray(offset**2 / (2 * self.samples))
 
 
-@dataclass(frozen=True)
+@options_by_name
+@dataclass(frozen=True, kw_only=True)
 class SPRT(ResidualTest):
     """Wald's sequential test of the fault-free mean against one changed mean, begun again after each decision.
 
@@ -123,7 +126,7 @@ class SPRT(ResidualTest):
         return self.false_alarm / (1 - self.non_detection)
 
     def increments(self, residual: Array) -> Array:
-        """ln of the likelihood ratio of each sample alone."""
+        """ln of the likelihood ratio of each sample of a residual (K,) alone."""
         return np.asarray(self.change / self.sigma * ((residual - self.mean - self.change / 2) / self.sigma))
 
     def _run(self, r: Array) -> tuple[Array, NDArray[np.bool_]]:

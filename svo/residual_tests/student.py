@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.residual_tests.interface import WindowTest, check_count, check_finite, check_probability, row_sums
 
 
-@dataclass(frozen=True)
+@options_by_name
+@dataclass(frozen=True, kw_only=True)
 class StudentT(WindowTest):
     """H1 where the mean of the last N residuals differs from the fault-free one by more than chance allows.
 

@@ -9,11 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.residual_tests.interface import WindowTest, check_count, check_finite
 
 
-@dataclass(frozen=True)
+@options_by_name
+@dataclass(frozen=True, kw_only=True)
 class RandomizedSubsampling(WindowTest):
     """H1 where too few of the sums over M subsamples of the last N residuals are positive, or too few negative.
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, finite_array, readings
 from svo.residual_tests.interface import (
     DecisionRecord,
@@ -20,7 +21,8 @@ from svo.residual_tests.interface import (
 _ROUNDING = 1e-12
 
 
-@dataclass(frozen=True)
+@options_by_name
+@dataclass(frozen=True, kw_only=True)
 class StaticThreshold(WindowTest):
     """H1 where the residual is more than nu standard deviations away from its mean.
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
+from polytopes.signatures import options_by_name
 from svo.checks import Array, finite_array
 from svo.residual_tests.interface import check_count, check_finite, check_positive
 
 
+@options_by_name
 @dataclass(frozen=True)
 class Whitening:
     """An autoregressive filter that makes a fault-free residual white, with mean 0 and variance 1.
@@ -29,6 +31,7 @@ class Whitening:
 
     mean: float
     sigma: float
+    _: KW_ONLY
     coefficients: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -63,7 +66,7 @@ class Whitening:
             raise ValueError("the residuals do not vary; expected noise to estimate a standard deviation from")
         coefficients = solve_toeplitz(covariance[:-1], covariance[1:]) if order else np.empty(0)
         variance = float(covariance[0] - coefficients @ covariance[1:])
-        return cls(mean, float(np.sqrt(variance)), tuple(map(float, coefficients)))
+        return cls(mean, float(np.sqrt(variance)), coefficients=tuple(map(float, coefficients)))
 
     def apply(self, residual: ArrayLike) -> Array:
         """The white residual (K,); before the first sample the residual is taken to have been at its mean."""
@@ -72,7 +75,7 @@ class Whitening:
 
 
 def normalised_sum(residual: ArrayLike, samples: int) -> Array:
-    """N^(-1/2) times the sum of the last N residuals, equation (45); NaN (K,) until there are N.
+    """N^(-1/2) times the sum of the last N = ``samples`` of a residual (K,), equation (45); NaN until there are N.
 
     With white residuals of variance 1 it is close to a standard Gaussian for large N, whatever their
     distribution; with correlated ones its variance is another (`Whitening`).

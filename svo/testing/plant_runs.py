@@ -98,7 +98,7 @@ def nominal_model(bank: Bank) -> UncertainModel:
 def cut(log: Log, first: int, end: int) -> Log:
     """Samples ``first`` to ``end`` of a log, the end not included."""
     x, schedule = (None if value is None else value[first:end] for value in (log.x, log.schedule))
-    return Log(log.time[first:end], log.u[first:end], log.y[first:end], x, schedule)
+    return Log(log.time[first:end], log.u[first:end], log.y[first:end], x=x, schedule=schedule)
 
 
 @dataclass(frozen=True)

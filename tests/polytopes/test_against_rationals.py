@@ -57,7 +57,7 @@ def test_projection(kind: str, count: int) -> None:
         keep = rng.permutation(P.dim)[: int(rng.integers(1, P.dim))].tolist()
         bounded = polyhedron(P).is_bounded()
         method = str(rng.choice(METHODS if bounded else ("auto", "fourier-motzkin")))
-        assert_exact(P.project(keep, method), shadow(P, keep), f"{case} {method}")
+        assert_exact(P.project(keep, method=method), shadow(P, keep), f"{case} {method}")
 
 
 @AMOUNT

@@ -116,7 +116,7 @@ def test_templates_are_the_exact_supports_rounded_up(count: int) -> None:
         assert_rounded_up(rows_of(P).outer_template(T), T, first, case)
         larger = [None if u is None or v is None else max(u, v, key=lambda r: Fraction(*r))
                   for u, v in zip(first, second, strict=True)]  # fmt: skip
-        assert_rounded_up(union_bounds([rows_of(P), rows_of(Q)], T), T, larger, case)
+        assert_rounded_up(union_bounds([rows_of(P), rows_of(Q)], directions=T), T, larger, case)
 
 
 def assert_rounded_up(result: HPolytope, T: np.ndarray, values: list[tuple[int, int] | None], case: str) -> None:

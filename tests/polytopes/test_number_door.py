@@ -152,7 +152,7 @@ BOX = HPolytope.box([0.0, 0.0], [1.0, 1.0])
         lambda value: BOX.preimage(value),
         lambda value: BOX.preimage(np.eye(2), value[0]),
         lambda value: BOX.outer_template(value),
-        lambda value: union_bounds([BOX], value),
+        lambda value: union_bounds([BOX], directions=value),
     ],
 )
 @pytest.mark.parametrize("value", [MASKED, np.eye(2) + 0j, np.eye(2).astype(str), np.eye(2).astype("m8[s]")])

@@ -132,7 +132,7 @@ def test_rows_may_be_multiplied_by_any_number(power: int) -> None:
     assert len(Q.generators().vertices) == len(P.generators().vertices)
     assert Q.remove_redundancy().b.size == P.remove_redundancy().b.size
     for method in METHODS:
-        assert Q.project([0, 1], method).equals(P.project([0, 1], method), tol=1e-12)
+        assert Q.project([0, 1], method=method).equals(P.project([0, 1], method=method), tol=1e-12)
     corner = HPolytope([[2.0**power, 0.0], [0.0, -1.0]], [2.0**power, 0.0]).generators()
     assert (len(corner.vertices), len(corner.rays)) == (1, 2)
 

@@ -91,7 +91,7 @@ def test_hulls_sums_and_bounds(count: int) -> None:
         assert polyhedron(total.pontryagin_difference(Q)).contains(eroded(polyhedron(total), second)), case
         T = np.vstack([rng.integers(-3, 4, (4, P.dim)) * 0.1, np.eye(P.dim), -np.eye(P.dim)])
         assert polyhedron(P.outer_template(T)).contains(first), case
-        assert polyhedron(union_bounds([P, Q], T)).contains(both), case
+        assert polyhedron(union_bounds([P, Q], directions=T)).contains(both), case
 
 
 @AMOUNT

@@ -118,7 +118,7 @@ def test_a_cone_keeps_its_apex_and_a_flat_set_its_points_in_any_template(name: s
         point = HPolytope(np.empty((0, P.dim)), [], np.eye(P.dim), corner)
         if P.intersection(point).emptiness().status == "nonempty":  # else it was rounded
             T = directions(P)
-            for Q in (P.outer_template(T), union_bounds([P, P], T), P.affine_map(np.eye(P.dim))):
+            for Q in (P.outer_template(T), union_bounds([P, P], directions=T), P.affine_map(np.eye(P.dim))):
                 assert Q.intersection(point).emptiness().status == "nonempty"
 
 
@@ -152,7 +152,7 @@ def test_bounds_of_a_union(name: str) -> None:
     Q = HPolytope.box(np.full(P.dim, 2.0), np.full(P.dim, 3.0))
     normals = np.vstack([np.eye(P.dim), -np.eye(P.dim), directions(P)[:5]])
     for chosen in (None, normals):
-        bounds = union_bounds([P, Q, HPolytope.empty(P.dim)], chosen)
+        bounds = union_bounds([P, Q, HPolytope.empty(P.dim)], directions=chosen)
         assert bounds.contains(P, tol=0.0 if name in EMPTY else 1e-13)
         assert bounds.contains(Q, tol=1e-13)
         tested = normals[: 2 * P.dim] if chosen is None else normals

@@ -28,7 +28,11 @@ OBSERVERS: dict[str, tuple[Any, int, int]] = {
     "window, one step": (lambda m, P: WindowObserver(m, P, horizon=1), 10, 16),
     "split by signs": (lambda m, P: WindowObserver(m, P, horizon=3, sign_split=4), 4, 8),
     "zonotope": (ConstrainedZonotopeObserver, 12, 10),
-    "small zonotope": (lambda m, P: ConstrainedZonotopeObserver(m, P, 2 * m.n_states, 1), 8, 10),
+    "small zonotope": (
+        lambda m, P: ConstrainedZonotopeObserver(m, P, max_generators=2 * m.n_states, max_constraints=1),
+        8,
+        10,
+    ),
     "polytope": (lambda m, P: PolytopeObserver(m, P, max_facets=40), 4, 6),
 }
 

@@ -51,7 +51,7 @@ def test_a_longer_window_is_not_wider() -> None:
     log = model.simulate(np.zeros(n), np.zeros((25, 0)), rng)
     width = {}
     for horizon in (5, 10):
-        observer = WindowObserver(model, start, horizon)
+        observer = WindowObserver(model, start, horizon=horizon)
         observer.update(log.y[0])
         for y in log.y[1:]:
             box = observer.step([], y).box
@@ -90,7 +90,7 @@ def test_the_arrays_of_a_copied_set_are_read_only() -> None:
 @later("C", ValueError, "the fourth positional argument of a model is E, not D")
 def test_what_follows_C_is_given_by_name() -> None:
     with pytest.raises(TypeError):
-        UncertainModel([[1.0]], [[1.0]], [[1.0]], [[1.0]])
+        UncertainModel([[1.0]], [[1.0]], [[1.0]], E=[[1.0]])
 
 
 @later("C", AssertionError, "the main verbs are not to be had from Python")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope, UndecidedError, warm_up
+from polytopes.signatures import options_by_name
 from svo.checks import Array, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm, set_in
@@ -96,11 +97,13 @@ class PolytopeObserver(Observer):
     kind = "polytope"
     saves_state = starts_without_set = True
 
+    @options_by_name
     def __init__(
         self,
         model: UncertainModel,
         initial: HPolytope,
         horizon: int = 1,
+        *,
         max_facets: int | None = 60,
         eps: float = 1e-9,
         as_published: bool = False,

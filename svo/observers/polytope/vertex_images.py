@@ -93,7 +93,7 @@ def _exact_image(joint: HPolytope, M: Array, t: Array, max_facets: int | None) -
     lifted = HPolytope(joint.A @ inverse, joint.b - joint.A @ shift, joint.C @ inverse, joint.d - joint.C @ shift)
     rows = _EXACT_ROWS if max_facets is None else _BUDGET_ROWS
     try:
-        return lifted.project(range(n), "fourier-motzkin", rows, max_facets is not None)
+        return lifted.project(range(n), method="fourier-motzkin", max_rows=rows, outer=max_facets is not None)
     except ProjectionLimitError as error:
         raise FacetLimitError(
             f"the projection on the next state forms more than {_EXACT_ROWS} rows in one step of elimination"

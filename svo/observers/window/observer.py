@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.checks import Array, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
@@ -67,11 +68,13 @@ class WindowObserver(RestartingWindow, Observer):
     kind = "window"
     takes_deadline = takes_late = saves_state = starts_without_set = True
 
+    @options_by_name
     def __init__(
         self,
         model: UncertainModel,
         initial: HPolytope,
         horizon: int | None = 10,
+        *,
         template: str | ArrayLike = "box",
         eps: float = 1e-9,
         sign_split: int = 0,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.checks import Array, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
@@ -66,10 +67,12 @@ class ConstrainedZonotopeObserver(Observer):
     kind = "constrained zonotope"
     saves_state = starts_without_set = True
 
+    @options_by_name
     def __init__(
         self,
         model: UncertainModel,
         initial: HPolytope,
+        *,
         max_generators: int | None = None,
         max_constraints: int | None = None,
         eps: float = 1e-9,

@@ -70,7 +70,7 @@ class IntervalSettings:
                 )
             learning, judged = [self._channel(log, slice(0, begin))], self._channel(log, slice(begin, None))
         residuals = [self._predictor(record).predict(record).residual for record in learning]
-        noise = NoiseCharacterization.from_records(residuals, self.qbar, self.safety_factor)
+        noise = NoiseCharacterization.from_records(residuals, self.qbar, safety_factor=self.safety_factor)
         return IntervalDetector(self._predictor(judged), noise, self.pole), judged
 
     def _predictor(self, log: Log) -> IntervalPredictor:

@@ -96,7 +96,7 @@ class DescribedPlant:
         if self.global_set is None:
             return ArchitectureI(nominal, faults, **self.bank_options)
         class_one = tuple(name for name, fault in self.faults.items() if fault.contains_nominal)
-        return ArchitectureII(nominal, faults, self.global_set, class_one, **self.bank_options)
+        return ArchitectureII(nominal, faults, self.global_set, class_one=class_one, **self.bank_options)
 
     def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
         """A described model has no schedule."""
@@ -178,7 +178,7 @@ def _observer_settings(top: Table, model: UncertainModel) -> ObserverSettings:
     with table.errors():
         # An observer checks its own arguments.
         anywhere = HPolytope.box(np.zeros(model.n_states), np.ones(model.n_states))
-        WindowObserver(model.replace(physical=None, largest=None), anywhere, horizon, template)
+        WindowObserver(model.replace(physical=None, largest=None), anywhere, horizon=horizon, template=template)
     return ObserverSettings(horizon, template)
 
 

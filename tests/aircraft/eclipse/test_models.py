@@ -98,10 +98,10 @@ def test_models_have_the_stated_uncertainties():
     np.testing.assert_allclose(alpha.bounds(37.0)[2], widened, rtol=1e-12)
     elevator = _model("quiet", "elevator")
     assert elevator.uncertainties[0].bounds == (0.0, 0.5)
-    np.testing.assert_array_equal(elevator.block("B", 37.1, 0), -elevator.block("B", 37.1) * [1, 0])
+    np.testing.assert_array_equal(elevator.block("B", 37.1, uncertainty=0), -elevator.block("B", 37.1) * [1, 0])
     dynamics = _model("quiet", "dynamics")
     assert dynamics.uncertainties[0].bounds == (0.0, 1.0)
-    direction = dynamics.block("A", 37.0, 0)
+    direction = dynamics.block("A", 37.0, uncertainty=0)
     assert np.linalg.matrix_rank(direction) == 1
     np.testing.assert_array_equal(direction[:, 1:], 0)
     assert direction[3, 0] == pytest.approx(0.3 * Derivatives().value("M_u", 37.0) * TS, rel=0.01)

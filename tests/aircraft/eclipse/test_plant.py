@@ -103,7 +103,7 @@ def test_deviation_reference_changes_the_dynamics_fault_only():
     for fault, same in (("elevator", True), ("dynamics", False)):
         ours, theirs = (p.simulate(fault, "step", "quiet", 0).y for p in (PLANT, deviation))
         assert (ours == theirs).all() == same
-    assert deviation.models("quiet")["dynamics"].block("a", 37.0, 0)[3] < 0
+    assert deviation.models("quiet")["dynamics"].block("a", 37.0, uncertainty=0)[3] < 0
 
 
 def test_dynamics_fault_in_deviation_coordinates_is_explained_by_the_nominal_model():

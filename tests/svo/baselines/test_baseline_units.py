@@ -96,7 +96,7 @@ def test_what_can_be_decoupled_does_not_depend_on_units(seed, span):
     with pytest.raises(ValueError, match="has rank 1"):
         unknown_input_exists(a, c, np.hstack([there, 3 * there]))
     with pytest.raises(ValueError, match="or no residual is left"):
-        unknown_input_exists(a, c, there, np.eye(3)[:, :2] / unit.y[:, None])
+        unknown_input_exists(a, c, there, D=np.eye(3)[:, :2] / unit.y[:, None])
 
 
 def test_multiple_models_without_switching_run_on_for_thousands_of_samples():

@@ -38,7 +38,7 @@ def stacked(log: Log, k: int, order: int):
 
 @pytest.mark.parametrize("order", [1, 3, 6])
 def test_squares_are_those_of_the_stacked_equations(log, order):
-    record = ParitySpace(MODEL, order).run(log)
+    record = ParitySpace(MODEL, order=order).run(log)
     assert np.isnan(record.squares[:order]).all()
     for k in range(order, len(log)):
         rest, observability, covariance, _ = stacked(log, k, order)
@@ -55,8 +55,8 @@ def test_a_fault_of_any_size_is_explained_by_its_own_signature(log):
     leak = np.tile([0.0, 1.0], (K, 1))
     effects = [(np.zeros((K, 2)), bias), (leak, np.zeros((K, 2)))]
     samples = MODEL.samples(Log(log.time, log.u, log.y + 3.0 * bias))
-    healthy, faulty = MODEL.samples(log), ParitySpace(MODEL, order).over(samples, effects)
-    same = ParitySpace(MODEL, order).over(healthy, effects)
+    healthy, faulty = MODEL.samples(log), ParitySpace(MODEL, order=order).over(samples, effects)
+    same = ParitySpace(MODEL, order=order).over(healthy, effects)
     np.testing.assert_allclose(faulty.unexplained[order:, 0], same.unexplained[order:, 0], rtol=1e-6, atol=1e-9)
     assert (faulty.squares[order:] > 30).all()
     assert (faulty.unexplained[order:, 1] > 20).all()
@@ -74,22 +74,22 @@ def test_a_fault_that_a_state_explains_but_for_a_hundred_thousandth_is_still_see
     free = np.array([C @ np.linalg.matrix_power(A, k) @ [1.0, -1.0] for k in range(K)])
     bias = 1e-5 * np.array([1.0, 0.0])
     short = Log(log.time[:K], log.u[:K], log.y[:K] + 1e6 * bias)
-    record = ParitySpace(MODEL, order).over(MODEL.samples(short), [(np.zeros((K, 2)), free + bias)])
-    plain = ParitySpace(MODEL, order).over(MODEL.samples(short), [(np.zeros((K, 2)), np.tile(bias, (K, 1)))])
+    record = ParitySpace(MODEL, order=order).over(MODEL.samples(short), [(np.zeros((K, 2)), free + bias)])
+    plain = ParitySpace(MODEL, order=order).over(MODEL.samples(short), [(np.zeros((K, 2)), np.tile(bias, (K, 1)))])
     assert record.unexplained[order, 0] == pytest.approx(plain.unexplained[order, 0], rel=1e-4)
     assert record.unexplained[order, 0] < 0.1 * record.squares[order]
-    gone = ParitySpace(MODEL, order).over(MODEL.samples(short), [(np.zeros((K, 2)), free)])
+    gone = ParitySpace(MODEL, order=order).over(MODEL.samples(short), [(np.zeros((K, 2)), free)])
     assert gone.unexplained[order, 0] == gone.squares[order]
 
 
 def test_wrong_arguments_are_named(log):
     with pytest.raises(ValueError, match="order is 0"):
-        ParitySpace(MODEL, 0)
+        ParitySpace(MODEL, order=0)
     with pytest.raises(ValueError, match="process_noise is -1"):
         ParitySpace(MODEL, process_noise=-1.0)
     one = GaussianModel(MODEL.model.replace(C=[[1.0, 0.0]], n=[0.1], c=[0.0]), MODEL.initial)
     with pytest.raises(ValueError, match=r"\(order \+ 1\) ny is not above n"):
-        ParitySpace(one, 1)
+        ParitySpace(one, order=1)
     log.y[3, 0] = np.nan
     with pytest.raises(ValueError, match="missing sensor at sample 3"):
         ParitySpace(MODEL).run(log)

@@ -133,7 +133,7 @@ def some_channels(rng: np.random.Generator, count: int) -> tuple[int, ...]:
 
 
 def some_profile(rng: np.random.Generator) -> Any:
-    return rng.choice([Step(START), Ramp(START, 2.0), Exponential(START, 0.7), Intermittent(START, 0.5, 0.4)])
+    return rng.choice([Step(START), Ramp(START, 2.0), Exponential(START, 0.7), Intermittent(START, 0.5, duty=0.4)])
 
 
 seeds = st.integers(0, 2**32 - 1)
@@ -219,7 +219,7 @@ def test_a_faulty_plant_is_explained_by_its_model(seed: int, scheduled: bool) ->
         clean = evaluate(nominal, sample, sample.deltas, sample.u, sample.w)
         matrix = sample.schedule * slope if scheduled else slope
         size = fault.magnitude * float(fault.profile.value(t))
-        dx, dy = fault.perturbation(nominal, t, sample.x, sample.u, sample.w, sample.schedule)
+        dx, dy = fault.perturbation(nominal, t, sample.x, sample.u, sample.w, schedule=sample.schedule)
         np.testing.assert_allclose(dx, size * matrix @ sample.x, atol=1e-12)
         np.testing.assert_allclose(dy, size * np.asarray(direction.c), atol=1e-12)
         deltas = full_deltas(model, nominal, sample, float(fault.delta(t)))
@@ -312,11 +312,11 @@ def test_profiles_have_their_shapes() -> None:
     np.testing.assert_array_equal(Step(1.0).value(t), [0, 0, 1, 1, 1, 1])
     np.testing.assert_allclose(Ramp(1.0, 2.0).value(t), [0, 0, 0, 0.25, 0.5, 1])
     np.testing.assert_allclose(Exponential(1.0, 2.0).value(t), [0, 0, 0, *(1 - np.exp(-np.array([0.25, 0.5, 1.5])))])
-    np.testing.assert_array_equal(Intermittent(1.0, 1.0, 0.5).value(t), [0, 0, 1, 0, 1, 1])
+    np.testing.assert_array_equal(Intermittent(1.0, 1.0, duty=0.5).value(t), [0, 0, 1, 0, 1, 1])
 
 
 def test_an_intermittent_fault_keeps_its_duty_on_a_grid() -> None:
-    values = Intermittent(0.5, 0.3, 1 / 3).value(np.arange(3050) * 0.01)
+    values = Intermittent(0.5, 0.3, duty=1 / 3).value(np.arange(3050) * 0.01)
     np.testing.assert_array_equal(values[:50], 0)
     np.testing.assert_array_equal(values[50:], np.tile([1.0] * 10 + [0.0] * 20, 100))
 
@@ -348,7 +348,7 @@ def test_a_profile_stays_between_zero_and_one(t: float, profile: Any) -> None:
         (lambda: Ramp(0.0, 0.0), "duration is 0"),
         (lambda: Exponential(0.0, -1.0), "time_constant is -1"),
         (lambda: Intermittent(0.0, 0.0), "period is 0"),
-        (lambda: Intermittent(0.0, 1.0, 1.0), "duty is 1"),
+        (lambda: Intermittent(0.0, 1.0, duty=1.0), "duty is 1"),
         (lambda: SensorFault(-1, "bias", 1.0, Step()), "where is -1"),
         (lambda: SensorFault((0, 0), "bias", 1.0, Step()), "each once"),
         (lambda: SensorFault((), "bias", 1.0, Step()), "at least one channel"),

@@ -36,4 +36,4 @@ def random_truth(samples: int, rng: np.random.Generator, corners: float = 0.5) -
     x[0] = rng.uniform(-1, 1)
     for k in range(samples - 1):
         x[k + 1] = g[k] * x[k] + (1 - g[k]) * h[k] * u[k]
-    return Truth(u, GainBounds(gc, gr, hc, hr), g, h, x)
+    return Truth(u, GainBounds(gc, gr, hc=hc, hr=hr), g, h, x)

@@ -21,8 +21,8 @@ def test_powers_of_two_on_state_and_input_scale_the_interval(seed: int, state: i
     slope, limit = (rng.uniform(0, 0.1), 0.2) if law else (0.0, np.inf)
     u, y, start = rng.normal(size=K), rng.normal(size=K), (rng.normal(), rng.uniform(0, 1))
     gain = state - drive
-    one = GainBounds(gc, gr, hc, hr, slope, limit)
-    two = GainBounds(gc, gr, np.ldexp(hc, gain), np.ldexp(hr, gain), np.ldexp(slope, -state), limit)
+    one = GainBounds(gc, gr, hc=hc, hr=hr, slope=slope, limit=limit)
+    two = GainBounds(gc, gr, hc=np.ldexp(hc, gain), hr=np.ldexp(hr, gain), slope=np.ldexp(slope, -state), limit=limit)
     log = Log(time=np.arange(float(K)), u=u[:, None], y=y[:, None])
     other = Log(time=log.time, u=np.ldexp(log.u, drive), y=np.ldexp(log.y, state))
     a = IntervalPredictor(one, start).predict(log)

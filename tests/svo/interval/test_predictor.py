@@ -34,7 +34,7 @@ def test_equation_15_as_printed_is_wrong(printed: str) -> None:
     gc, gr, hc, hr, *_ = truth.bounds.over(len(truth.u))
     if printed == "gc for gr":
         gc, gr = np.abs(gc) * 0.9, np.full_like(gr, 0.003)
-    p = IntervalPredictor(GainBounds(gc, gr, hc, hr), (0.0, 1.0)).predict(log_of(truth.u))
+    p = IntervalPredictor(GainBounds(gc, gr, hc=hc, hr=hr), (0.0, 1.0)).predict(log_of(truth.u))
     radius = np.ones_like(p.radius)
     for k in range(len(radius) - 1):
         away = abs(p.center[k] - hc[k] * truth.u[k])
@@ -56,7 +56,7 @@ def test_one_step_holds_in_exact_arithmetic() -> None:
     for _ in range(500):
         gr, hr, hc, u, center = rng.uniform(0, 0.5), rng.uniform(0, 1), *rng.normal(size=3)
         gc = rng.uniform(-1, 1) * (1 - gr) * 0.99
-        predictor = IntervalPredictor(GainBounds(gc, gr, hc, hr), (center, rng.uniform(0, 1)))
+        predictor = IntervalPredictor(GainBounds(gc, gr, hc=hc, hr=hr), (center, rng.uniform(0, 1)))
         before = predictor.interval
         after = predictor.step(u)
         lower, upper = Fraction(after.lower), Fraction(after.upper)

@@ -151,7 +151,7 @@ def test_one_outlier_is_over_after_the_recovery() -> None:
 def test_an_intermittent_fault_is_recognised_as_over_each_time() -> None:
     rng = np.random.default_rng(5)
     nominal = plant(rng)
-    log = fly(nominal, faults(Intermittent(START, 2.0, 0.5))["bias"], X0, rng, samples=70)
+    log = fly(nominal, faults(Intermittent(START, 2.0, duty=0.5))["bias"], X0, rng, samples=70)
     record = bank(nominal, recovery=4).run(log)
     assert record.died_at["bias"] is None
     for k, state in enumerate(record.states):
@@ -165,7 +165,7 @@ def test_an_intermittent_fault_is_recognised_as_over_each_time() -> None:
 def test_a_class_two_fault_that_goes_away_is_recognised() -> None:
     rng = np.random.default_rng(6)
     nominal = plant(rng)
-    log = fly(nominal, faults(Intermittent(START, 4.0, 0.5))["hard-over"], X0, rng, samples=45)
+    log = fly(nominal, faults(Intermittent(START, 4.0, duty=0.5))["hard-over"], X0, rng, samples=45)
     record = bank(nominal, recovery=6).run(log)
     assert record.fault == "hard-over"
     assert record.states[AT_DETECTION + 19] == "isolated"

@@ -43,7 +43,11 @@ def second_bank(profile: Any, **options: Any) -> Bank:
     observers = {name: WindowObserver(fault.model(nominal), X0, horizon=4) for name, fault in faults.items()}
     both = pairs(faults)["bias + loss"].model(nominal)
     return ArchitectureII(
-        WindowObserver(nominal, X0, horizon=4), observers, WindowObserver(both, X0, horizon=4), ("bias",), **options
+        WindowObserver(nominal, X0, horizon=4),
+        observers,
+        WindowObserver(both, X0, horizon=4),
+        class_one=("bias",),
+        **options,
     )
 
 

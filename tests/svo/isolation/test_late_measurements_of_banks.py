@@ -25,15 +25,17 @@ DELAY = 2
 
 def bank_one(nominal: UncertainModel, faults: dict[str, Any], horizon: int | None = 4, **options: Any) -> ArchitectureI:
     first = HPolytope.box(np.full(2, -0.5), np.full(2, 0.5))
-    observers = {name: WindowObserver(fault.model(nominal), first, horizon) for name, fault in faults.items()}
-    return ArchitectureI(WindowObserver(nominal, first, horizon), observers, **options)
+    observers = {name: WindowObserver(fault.model(nominal), first, horizon=horizon) for name, fault in faults.items()}
+    return ArchitectureI(WindowObserver(nominal, first, horizon=horizon), observers, **options)
 
 
 def bank_two(nominal: UncertainModel, faults: dict[str, Any], **options: Any) -> ArchitectureII:
     first = HPolytope.box(np.full(2, -0.5), np.full(2, 0.5))
-    observers = {name: WindowObserver(fault.model(nominal), first, 4) for name, fault in faults.items()}
+    observers = {name: WindowObserver(fault.model(nominal), first, horizon=4) for name, fault in faults.items()}
     wide = nominal.replace(w=np.full(2, 20.0), n=np.full(2, 3.0))  # contains every fault of these tests
-    return ArchitectureII(WindowObserver(nominal, first, 4), observers, WindowObserver(wide, first, 4), **options)
+    return ArchitectureII(
+        WindowObserver(nominal, first, horizon=4), observers, WindowObserver(wide, first, horizon=4), **options
+    )
 
 
 def take(bank: Bank, log: Log, k: int, late: bool) -> Verdict:
@@ -48,9 +50,7 @@ def take(bank: Bank, log: Log, k: int, late: bool) -> Verdict:
 
 @few
 @given(seed=st.integers(0, 2**32 - 1), horizon=st.sampled_from([4, None]), ramp=st.booleans())
-def test_a_bank_with_late_data_says_what_one_with_data_in_time_says(
-    seed: int, horizon: int | None, ramp: bool
-) -> None:
+def test_a_bank_with_late_data_says_what_one_with_data_in_time_says(seed: int, horizon: int | None, ramp: bool) -> None:
     rng = np.random.default_rng(seed)
     nominal = plant(rng)
     faults = faults_of(rng, 2, Ramp(START, 1.0) if ramp else Step(START))
@@ -186,8 +186,8 @@ def test_a_measurement_that_comes_twice_is_refused_before_any_observer_changes()
     nominal = plant(rng)
     log = fly(nominal, None, np.zeros(2), rng, samples=12)
     first = HPolytope.box(np.full(2, -0.5), np.full(2, 0.5))
-    wide = WindowObserver(nominal.replace(w=np.full(2, 20.0), n=np.full(2, 3.0)), first, 4)
-    bank = ArchitectureI(WindowObserver(nominal, first, 4), {"wide": wide}, debounce=2, recovery=5)
+    wide = WindowObserver(nominal.replace(w=np.full(2, 20.0), n=np.full(2, 3.0)), first, horizon=4)
+    bank = ArchitectureI(WindowObserver(nominal, first, horizon=4), {"wide": wide}, debounce=2, recovery=5)
     log.y[8, 1] += 1.5
     for k in range(9):
         verdict = take(bank, log, k, late=False)

@@ -114,7 +114,7 @@ def test_debounce_still_finds_a_fault() -> None:
 def test_an_intermittent_fault_comes_and_goes() -> None:
     nominal, faults, _ = outlier_case()
     rng = np.random.default_rng(4)
-    on_off = replace(faults["bias"], profile=Intermittent(START, 2.0, 0.5))
+    on_off = replace(faults["bias"], profile=Intermittent(START, 2.0, duty=0.5))
     log = fly(nominal, on_off, np.zeros(2), rng, samples=60)
     record = bank(nominal, faults, np.zeros(2), recovery=4).run(log)
     assert record.died_at["bias"] is None

@@ -171,7 +171,9 @@ CASES |= {
     "detector u": Case(lambda v: interval_detector().step(v, 0.1), [0.1]),
     "noise record": Case(lambda v: NoiseCharacterization.from_records([v], 2), np.sin(np.arange(20.0)), True),
     "residual": Case(lambda v: CUSUM(change=1.0, threshold=5.0).run(v), [0.1, 0.2], True),
-    "online residual": Case(lambda v: StaticThreshold(0.0, 1.0, 3.0).start().step(v), np.array(0.1), True),
+    "online residual": Case(
+        lambda v: StaticThreshold(mean=0.0, sigma=1.0, nu=3.0).start().step(v), np.array(0.1), True
+    ),
     "indices time": Case(lambda v: detection_indices(v, np.array([False, True, True]), 1.0), TIME),
     "kalman y": Case(lambda v: InnovationFilter(GaussianModel(MODEL, START)).start().update(v), Y[0], True),
     "data frame": Case(frame, Y[:, 0], True),
@@ -318,7 +320,7 @@ NUMBERS: dict[str, Callable[[Any], Any]] = {
     "duration": lambda v: Ramp(0.0, v),
     "pole": lambda v: IntervalDetector(interval_detector().predictor, interval_detector().noise, v),
     "initial radius": lambda v: IntervalPredictor(GainBounds(0.5, 0.1), (0.0, v)),
-    "sigma": lambda v: StaticThreshold(0.0, v, 3.0),
+    "sigma": lambda v: StaticThreshold(mean=0.0, sigma=v, nu=3.0),
     "schedule of a table": ScheduleTable([0.0, 1.0], [1.0, 2.0]),
 }
 

@@ -62,7 +62,7 @@ def falsified(seed: int) -> tuple[WindowCertificate | None, np.ndarray]:
     schedule = rng.uniform(0, 1, SAMPLES) if model.is_scheduled else None
     log = model.simulate(x0, rng.normal(size=(SAMPLES, model.n_inputs)), rng, corners=False, schedule=schedule)
     template = "box" if rng.random() < 0.5 else rng.normal(size=(2, model.n_states))
-    observer = WindowObserver(model, initial_set(rng, x0), int(rng.integers(1, 11)), template)
+    observer = WindowObserver(model, initial_set(rng, x0), horizon=int(rng.integers(1, 11)), template=template)
     run = observer.run(replace(log, y=corrupted(rng, log.y)))
     return run.certificate, log.y
 

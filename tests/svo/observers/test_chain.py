@@ -23,7 +23,7 @@ def check_every_bound_is_proven(seed: int) -> None:
     y[12:] += 5.0 + 5.0 * np.abs(np.nan_to_num(y[12:]))  # nothing healthy explains this
     template = "box" if rng.random() < 0.6 else rng.normal(size=(1, model.n_states))
     horizon = int(rng.choice([1, 3, 5]))
-    observer = WindowObserver(model, HPolytope.box(x0 - 0.5, x0 + 0.5), horizon, template)
+    observer = WindowObserver(model, HPolytope.box(x0 - 0.5, x0 + 0.5), horizon=horizon, template=template)
     bad = Log(log.time, log.u, y)
     verdicts = observer.run(bad).verdicts
     chain = prove_chain(observer, bad)
@@ -97,4 +97,4 @@ def test_what_cannot_be_proven_is_refused() -> None:
     for taken, arrived in ((2, 4), (3, 2), (-1, 2)):
         late = LateMeasurement(arrived=arrived, taken=taken, y=np.zeros(1))
         with pytest.raises(ValueError, match=rf"late\[0\] was taken at sample {taken} .* 0 <= taken <= arrived <= 3"):
-            prove_chain(WindowObserver(model, start), log, [late])
+            prove_chain(WindowObserver(model, start), log, late=[late])

@@ -17,7 +17,7 @@ HORIZONS = (1, 3, 10, None)
 
 def lost(model: UncertainModel, horizon: int | None, **options: Any) -> WindowObserver:
     """An observer whose set is gone: by an input that no float can follow, then by nothing read."""
-    observer = WindowObserver(model, start(model), horizon, **options)
+    observer = WindowObserver(model, start(model), horizon=horizon, **options)
     observer.update(np.full(model.n_outputs, np.nan))
     observer._lose()
     return observer
@@ -83,7 +83,7 @@ def test_an_input_that_overflows_is_no_silent_blindness(horizon: int | None) -> 
     model = UncertainModel([[0.9, 0.1], [0.0, 0.8]], [[0.0], [1.0]], [[1.0, 0.0]], E=np.eye(2), w=[0.1, 0.1], n=0.05)
     u = np.zeros((30, 1))
     u[12] = 1.7e308
-    observer = WindowObserver(model, start(model), horizon)
+    observer = WindowObserver(model, start(model), horizon=horizon)
     steps = []
     for step in answers(observer, np.zeros((30, 1)), u):
         steps.append((step.verdict, step.reason))
@@ -97,7 +97,7 @@ def test_an_input_that_overflows_is_no_silent_blindness(horizon: int | None) -> 
 @pytest.mark.parametrize("size", [1e6, 1e30, 1e154, 1e308, -1.7e308])
 @pytest.mark.parametrize("horizon", HORIZONS)
 def test_an_enormous_reading_is_falsified_by_a_set_and_ignored_without_one(horizon: int | None, size: float) -> None:
-    observer = WindowObserver(rotation(), start(rotation()), horizon)
+    observer = WindowObserver(rotation(), start(rotation()), horizon=horizon)
     observer.update([0.0])
     step = observer.step(None, [size])
     assert step.verdict == "falsified"
@@ -177,14 +177,14 @@ def test_a_deadline_in_a_gap() -> None:
 
 
 def run(model: UncertainModel, y: Any, horizon: int | None = 10) -> tuple[Log, WindowObserver, list[Any]]:
-    observer = WindowObserver(model, start(model), horizon)
+    observer = WindowObserver(model, start(model), horizon=horizon)
     log = Log(np.arange(float(len(y))), np.zeros((len(y), 0)), np.array(y, dtype=float))
     steps = []
     for step in answers(observer, log.y):
         steps.append(step)
         if step.verdict == "falsified":
             break
-    return log, WindowObserver(model, start(model), horizon), steps
+    return log, WindowObserver(model, start(model), horizon=horizon), steps
 
 
 def test_the_largest_set_is_where_a_set_starts_again_and_a_premise_of_the_alarm() -> None:
@@ -233,7 +233,7 @@ def test_readings_that_bound_the_state_make_the_premise_unnecessary() -> None:
 @pytest.mark.parametrize("horizon", HORIZONS[:-1])
 def test_the_physical_range_cuts_every_set(horizon: int) -> None:
     model = rotation(physical=(-3.0, [np.inf, 4.0]))
-    observer = WindowObserver(model, HPolytope.box([-9.0, -1.0], [9.0, 9.0]), horizon)
+    observer = WindowObserver(model, HPolytope.box([-9.0, -1.0], [9.0, 9.0]), horizon=horizon)
     for step in answers(observer, [[np.nan]] * 300):
         lower, upper = step.box
         assert (lower >= -3.0).all()
@@ -257,7 +257,7 @@ def test_the_physical_range_is_a_premise_of_the_chain() -> None:
 def test_data_outside_the_physical_range_are_no_alarm_without_a_proof() -> None:
     """x+ = x + w reads more and more: healthy by the model, outside the range, and no window proves it."""
     model = UncertainModel([[1.0]], None, [[1.0]], E=[[1.0]], w=[0.2], n=0.1, physical=(-2.0, 0.5))
-    observer = WindowObserver(model, start(model), 3)
+    observer = WindowObserver(model, start(model), horizon=3)
     steps = list(answers(observer, [[0.2 * k] for k in range(12)]))
     assert any(step.reason == "outside the physical range" for step in steps)
     assert all(step.verdict != "falsified" or step.certificate.verify() for step in steps)

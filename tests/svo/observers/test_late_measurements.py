@@ -39,7 +39,7 @@ def test_full_information_is_the_same_whenever_the_measurements_come(seed: int) 
     x0 = rng.uniform(-1.0, 1.0, model.n_states)
     log = model.simulate(x0, rng.normal(size=(9, model.n_inputs)), rng)
     late = rng.random(log.y.shape) < 0.4
-    in_time, delayed = (WindowObserver(model, HPolytope.box(x0 - 0.5, x0 + 0.5), None) for _ in range(2))
+    in_time, delayed = (WindowObserver(model, HPolytope.box(x0 - 0.5, x0 + 0.5), horizon=None) for _ in range(2))
     arriving = np.where(late, np.nan, log.y)
     for k in range(len(log)):
         for observer, y in ((in_time, log.y), (delayed, arriving)):
@@ -119,7 +119,7 @@ def test_an_alarm_by_late_data_is_proven_from_the_first_sample(uncertain: bool) 
     assert judge(step.certificate) == "empty"
     assert step.certificate.last == 23  # taken at 21, known two samples later
     seen = Log(log.time, log.u, np.column_stack([y[:, 0], np.full(40, np.nan)]))
-    chain = prove_chain(observer, seen, sent)
+    chain = prove_chain(observer, seen, late=sent)
     assert chain.unproven == ()
     assert chain.proven
     assert chain.falsified_at == 23

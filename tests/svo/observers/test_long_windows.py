@@ -38,7 +38,7 @@ def log_of(model: UncertainModel, seed: int, samples: int) -> Log:
 def boxes_of(model: UncertainModel, log: Log, horizon: int | None, every: int) -> dict[int, tuple[np.ndarray, ...]]:
     """Boxes before any program was stopped."""
     initial = HPolytope.box(-np.ones(model.n_states), np.ones(model.n_states))
-    observer, boxes = WindowObserver(model, initial, horizon), {}
+    observer, boxes = WindowObserver(model, initial, horizon=horizon), {}
     for k, step in enumerate(drive(observer, log)):
         assert step.verdict == "consistent"
         if k % every == every - 1:
@@ -68,7 +68,7 @@ def test_the_rounding_of_the_state_is_within_its_bound_and_the_bound_is_small(
     if radius == 0.0:
         model = model.replace(A=np.diag(np.ones(n - 1), 1))  # nilpotent: columns without length
     log = log_of(model, 2, 26)
-    observer = WindowObserver(model, HPolytope.box(-np.ones(n), np.ones(n)), horizon)
+    observer = WindowObserver(model, HPolytope.box(-np.ones(n), np.ones(n)), horizon=horizon)
     for k in range(len(log)):
         _ = observer.update(log.y[k]) if k == 0 else observer.step(None, log.y[k])
     w, size = observer._arrays, observer._size
@@ -160,7 +160,7 @@ def test_no_room_for_a_longer_window_is_one_error_and_loses_nothing(monkeypatch:
     """Where the machine has too little memory for a window that no limit forbids."""
     model, box = large_plant(1, 4), HPolytope.box(-np.ones(4), np.ones(4))
     log = log_of(model, 1, 20)
-    observer, other = WindowObserver(model, box, None), WindowObserver(model, box, None)
+    observer, other = WindowObserver(model, box, horizon=None), WindowObserver(model, box, horizon=None)
 
     def no_room(size: object) -> None:
         raise MemoryError("Unable to allocate 9 GiB")
@@ -174,7 +174,7 @@ def test_no_room_for_a_longer_window_is_one_error_and_loses_nothing(monkeypatch:
                 with pytest.raises(ValueError, match=r"of 32 steps \(Unable to allocate 9 GiB\); expected a"):
                     observer.step(None, y)
                 with pytest.raises(ValueError, match="horizon makes a window of 699 steps"):
-                    WindowObserver(model, box, 500)
+                    WindowObserver(model, box, horizon=500)
             assert before == {name: value.tobytes() for name, value in observer.state_dict().items()}
         step = observer.update(y) if k == 0 else observer.step(None, y)
         assert np.array_equal(step.box, expected.box)

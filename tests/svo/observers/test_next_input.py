@@ -155,7 +155,7 @@ def test_the_truth_stays_inside_a_window_without_it(seed: int) -> None:
     horizon = [1, 2, 3, 5, None][int(rng.integers(0, 5))]
     cells = 4 if rng.random() < 0.2 else 0
     options = {"deadline": 0.0} if not cells and rng.random() < 0.2 else {}
-    check_run(WindowObserver(model, start, horizon, sign_split=cells), log, rng, **options)
+    check_run(WindowObserver(model, start, horizon=horizon, sign_split=cells), log, rng, **options)
 
 
 @settings(max_examples=20, deadline=None)
@@ -193,7 +193,7 @@ def test_readings_that_come_late_count_as_if_they_had_come_in_time(seed: int) ->
     rng = np.random.default_rng(seed)
     model = plant(rng)
     log, start = flight(model, rng, 8)
-    in_time, late = (WindowObserver(model, start, None) for _ in range(2))
+    in_time, late = (WindowObserver(model, start, horizon=None) for _ in range(2))
     for k in range(len(log)):
         given = [log.u[k - 1]] if k else []
         call = "step" if k else "update"
@@ -214,7 +214,7 @@ def test_a_refused_sample_leaves_no_trace_of_its_input(D: Any) -> None:
         [[0.9, 0.1], [0.0, 0.8]], [[0.0], [1.0]], [[1.0, 0.0]], E=np.eye(2), F=[[1.0, 0.0]], w=[0.05, 0.1], n=3.0, D=D,
         uncertainties=[Uncertainty(A=rising), Uncertainty(B=[[0.0], [0.3]])], schedule=0.0,
     )  # fmt: skip
-    observer, twin = (WindowObserver(model, HPolytope.box([-1.0, -1.0], [1.0, 1.0]), 8) for _ in range(2))
+    observer, twin = (WindowObserver(model, HPolytope.box([-1.0, -1.0], [1.0, 1.0]), horizon=8) for _ in range(2))
     for o in (observer, twin):
         o.update([0.0], [1.0], schedule=0.0)
         for y in (0.5, 0.5, 0.5, np.nan):
@@ -240,7 +240,7 @@ def test_an_alarm_without_it_is_proven_from_the_first_sample_on(seed: int) -> No
     y = log.y.copy()
     y[8:] += 5.0 + 5.0 * np.abs(np.nan_to_num(y[8:]))
     bad = Log(log.time, log.u, y)
-    observer = WindowObserver(model, start, int(rng.choice([1, 3, 5])))
+    observer = WindowObserver(model, start, horizon=int(rng.choice([1, 3, 5])))
     record = observer.run(bad)
     chain = prove_chain(observer, bad)
     assert chain.unproven == ()
@@ -274,11 +274,11 @@ def test_a_bank_without_it_isolates_as_one_that_is_given_it(architecture: Any) -
     both = models.pop("loss + scale")
 
     def bank() -> Any:
-        observers = {name: WindowObserver(model, X0, 4) for name, model in models.items()}
+        observers = {name: WindowObserver(model, X0, horizon=4) for name, model in models.items()}
         if architecture is ArchitectureI:
-            observers["both"] = WindowObserver(both, X0, 4)
-            return ArchitectureI(WindowObserver(nominal, X0, 4), observers)
-        return ArchitectureII(WindowObserver(nominal, X0, 4), observers, WindowObserver(both, X0, 4))
+            observers["both"] = WindowObserver(both, X0, horizon=4)
+            return ArchitectureI(WindowObserver(nominal, X0, horizon=4), observers)
+        return ArchitectureII(WindowObserver(nominal, X0, horizon=4), observers, WindowObserver(both, X0, horizon=4))
 
     rng, x, u = np.random.default_rng(0), 0.0, np.zeros(1)
     without, given = bank(), bank()

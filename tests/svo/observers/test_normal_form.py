@@ -91,7 +91,7 @@ def test_units_change_nothing_of_a_window(seed: int) -> None:
     units = Units.random(rng, model)
 
     def make(model: UncertainModel, start: HPolytope, x: Any) -> WindowObserver:
-        return WindowObserver(model, start, horizon, np.ldexp(T, -x))
+        return WindowObserver(model, start, horizon=horizon, template=np.ldexp(T, -x))
 
     one, two = compare(make, units, model, start, log)
     if one is not None:

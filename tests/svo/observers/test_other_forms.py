@@ -102,7 +102,7 @@ def beyond(write: Callable[[Case, int], Case], seed: int) -> float:
     corners, horizon = seed % 2 == 0, (4, 10, None)[seed % 3]
     one = plant(seed, corners)
     two = write(one, seed)
-    a, b = runs(lambda m, P: WindowObserver(m, P, horizon), one, two)
+    a, b = runs(lambda m, P: WindowObserver(m, P, horizon=horizon), one, two)
     assert "falsified" not in a.verdicts
     return difference(a, b, two.order) - (ROOM if corners else 0.0)
 
@@ -158,6 +158,6 @@ def test_a_tie_in_a_factorisation_does_not_matter() -> None:
     for seed in (79, 28, 86):
         one = plant(seed, corners=True, integers=True)
         two = reordered(one, seed)
-        a, b = runs(lambda m, P: WindowObserver(m, P, 4), one, two)
+        a, b = runs(lambda m, P: WindowObserver(m, P, horizon=4), one, two)
         worst = max(worst, difference(a, b, two.order))
     assert worst <= ROOM

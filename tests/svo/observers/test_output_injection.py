@@ -56,7 +56,7 @@ def random_run(seed: int, samples: int = 12, missing: float = 0.2, **changes: An
 
 def observer_of(model: UncertainModel, log: Log, horizon: int | None, **options: Any) -> WindowObserver:
     assert log.x is not None
-    return WindowObserver(model, HPolytope.box(log.x[0] - 0.4, log.x[0] + 0.6), horizon, **options)
+    return WindowObserver(model, HPolytope.box(log.x[0] - 0.4, log.x[0] + 0.6), horizon=horizon, **options)
 
 
 def test_which_models_are_injected() -> None:

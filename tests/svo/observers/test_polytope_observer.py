@@ -55,7 +55,7 @@ def check_containment(observer: PolytopeObserver, log: Log, y: np.ndarray) -> No
 @given(seeds, st.sampled_from([1, 1, 3]))
 def test_truth_stays_inside_random_uncertain_plants(seed: int, horizon: int) -> None:
     _, model, initial, log, y = random_run(seed, 6)
-    check_containment(PolytopeObserver(model, initial, horizon, max_facets=40), log, y)
+    check_containment(PolytopeObserver(model, initial, horizon=horizon, max_facets=40), log, y)
 
 
 @settings(max_examples=10, deadline=None)
@@ -76,7 +76,7 @@ def test_truth_stays_inside_a_set_thinner_than_floats_resolve() -> None:
 def test_truth_stays_inside_three_hundred_random_plants() -> None:
     for seed in range(300):
         _, model, initial, log, y = random_run(seed, 12)
-        check_containment(PolytopeObserver(model, initial, 1 + seed % 3, max_facets=40), log, y)
+        check_containment(PolytopeObserver(model, initial, horizon=1 + seed % 3, max_facets=40), log, y)
 
 
 @pytest.mark.parametrize("horizon", [1, 2, 3])
@@ -87,8 +87,8 @@ def test_published_form_falsifies_a_healthy_plant_and_the_sound_form_does_not(
     model, y = scalar_counterexample()
     initial = HPolytope.box([0.9], [1.1])
     with pytest.warns(UserWarning, match="exclude the true state"):
-        published = PolytopeObserver(model, initial, horizon, max_facets, as_published=True)
-    sound = PolytopeObserver(model, initial, horizon, max_facets)
+        published = PolytopeObserver(model, initial, horizon=horizon, max_facets=max_facets, as_published=True)
+    sound = PolytopeObserver(model, initial, horizon=horizon, max_facets=max_facets)
     for observer, verdict in ((published, "falsified"), (sound, "consistent")):
         steps = [observer.update([y[0]]), *(observer.step(None, [value]) for value in y[1:])]
         assert steps[-1].verdict == verdict
@@ -156,7 +156,7 @@ def test_without_uncertainty_the_published_form_is_exact(horizon: int) -> None:
     log = model.simulate([0.5, 0.5], np.zeros((6, 0)), rng)
     initial = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
     with pytest.warns(UserWarning, match="equation"):
-        published = PolytopeObserver(model, initial, horizon, None, as_published=True)
+        published = PolytopeObserver(model, initial, horizon=horizon, max_facets=None, as_published=True)
     exact = PolytopeObserver(model, initial, max_facets=None)
     for k in range(6):
         sets = [(o.update(log.y[0]) if k == 0 else o.step(None, log.y[k])).set for o in (published, exact)]
@@ -229,7 +229,10 @@ def test_a_budget_gives_a_superset_of_the_exact_set(seed: int, horizon: int) -> 
     )  # fmt: skip
     log = model.simulate([0.5, 0.5], np.zeros((5, 0)), rng)
     initial = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
-    exact, reduced = PolytopeObserver(model, initial, max_facets=None), PolytopeObserver(model, initial, horizon, 4)
+    exact, reduced = (
+        PolytopeObserver(model, initial, max_facets=None),
+        PolytopeObserver(model, initial, horizon=horizon, max_facets=4),
+    )
     for k in range(5):
         steps = [o.update(log.y[0]) if k == 0 else o.step(None, log.y[k]) for o in (exact, reduced)]
         assert len(steps[1].set.b) <= 4
@@ -255,7 +258,7 @@ def test_exact_mode_stops_at_its_limit_and_stays_as_it_was(monkeypatch: pytest.M
 @pytest.mark.parametrize(("F", "horizon"), [(None, 1), (None, 3), ([[0.1]], 1), ([[0.1]], 3)])
 def test_an_alarm_has_a_proof_that_fails_for_other_data(F: list[list[float]] | None, horizon: int) -> None:
     model = UncertainModel([[0.9]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.1], F=F)
-    observer = PolytopeObserver(model, HPolytope.box([-1.0], [1.0]), horizon)
+    observer = PolytopeObserver(model, HPolytope.box([-1.0], [1.0]), horizon=horizon)
     assert observer.update([0.0]).certificate is None
     assert observer.step(None, [0.0]).certificate is None
     step = observer.step(None, [3.0])

@@ -72,7 +72,7 @@ def test_truth_stays_inside_with_any_number_of_cells(seed: int) -> None:
     model = random_plant(rng, largest=3)
     x0 = rng.uniform(-1.0, 1.0, model.n_states)
     log = model.simulate(x0, rng.normal(size=(10, model.n_inputs)), rng, corners=bool(rng.random() < 0.5))
-    observer = WindowObserver(model, HPolytope.box(x0 - 1.0, x0 + 1.0), 3, sign_split=int(rng.integers(1, 12)))
+    observer = WindowObserver(model, HPolytope.box(x0 - 1.0, x0 + 1.0), horizon=3, sign_split=int(rng.integers(1, 12)))
     for k, step in enumerate(drive(observer, log)):
         assert step.verdict == "consistent"
         assert log.x is not None
@@ -148,7 +148,7 @@ class SplitPlant:
     def bank(self, noise: str) -> ArchitectureI:
         spread = Uncertainty(A=[[0.0, 0.0], [1.0, 0.0]], bounds=(-1.0, 1.0))
         model = UncertainModel([[1.0, 0.0], [0.0, 0.0]], None, np.eye(2), n=[0.2, 0.01], uncertainties=[spread])
-        return ArchitectureI(WindowObserver(model, HPolytope.box([-1, -1], [1, 1]), 4, sign_split=ENOUGH), {})
+        return ArchitectureI(WindowObserver(model, HPolytope.box([-1, -1], [1, 1]), horizon=4, sign_split=ENOUGH), {})
 
 
 @pytest.mark.parametrize(("last", "sample"), [([0.0, np.nan], None), ([3.0, np.nan], 2)])

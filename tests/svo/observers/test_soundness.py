@@ -52,7 +52,7 @@ def test_truth_stays_inside_random_uncertain_plants(seed: int) -> None:
         y[rng.random(y.shape) < 0.3] = np.nan
     template = "box" if rng.random() < 0.6 else rng.normal(size=(2, model.n_states))
     horizon = int(rng.choice([1, 2, 3, 5, 8, 10]))
-    check_containment(WindowObserver(model, random_initial(rng, x0), horizon, template), log, y)
+    check_containment(WindowObserver(model, random_initial(rng, x0), horizon=horizon, template=template), log, y)
 
 
 @settings(max_examples=20, deadline=None)
@@ -62,7 +62,7 @@ def test_truth_stays_inside_with_full_information(seed: int) -> None:
     model = random_plant(rng, largest=3)
     x0 = rng.uniform(-1.0, 1.0, model.n_states)
     log = model.simulate(x0, rng.normal(size=(24, model.n_inputs)), rng, corners=True)
-    check_containment(WindowObserver(model, random_initial(rng, x0), None), log, log.y)
+    check_containment(WindowObserver(model, random_initial(rng, x0), horizon=None), log, log.y)
 
 
 @pytest.mark.slow
@@ -121,7 +121,7 @@ def test_published_stack_excludes_a_healthy_plant() -> None:
 @pytest.mark.parametrize("horizon", [1, 2, 3, None])
 def test_window_explains_the_healthy_plant_that_the_published_stack_excludes(horizon: int | None) -> None:
     model, y = scalar_counterexample()
-    observer = WindowObserver(model, HPolytope.box([0.9], [1.1]), horizon)
+    observer = WindowObserver(model, HPolytope.box([0.9], [1.1]), horizon=horizon)
     steps = [observer.update([y[0]]), *(observer.step(None, [value]) for value in y[1:])]
     assert [s.verdict for s in steps] == ["consistent"] * 3
     assert steps[-1].box[0][0] <= 1.0 <= steps[-1].box[1][0]

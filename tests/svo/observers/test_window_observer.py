@@ -130,10 +130,12 @@ def test_steps_without_a_first_measurement_start_from_the_initial_set() -> None:
 
 def test_more_steps_and_more_directions_never_widen_the_box() -> None:
     model, log = flown(60)
-    widths = [np.ptp(run_all(WindowObserver(model, BOX, h), log)[-1][1:], axis=0) for h in (1, 4, 12, None)]
+    widths = [np.ptp(run_all(WindowObserver(model, BOX, horizon=h), log)[-1][1:], axis=0) for h in (1, 4, 12, None)]
     for wider, tighter in itertools.pairwise(widths):
         assert (tighter <= wider * (1 + 1e-6)).all()  # the slack depends on the window
-    slanted = np.ptp(run_all(WindowObserver(model, BOX, 1, template=[[1.0, 0.1], [1.0, -0.5]]), log)[-1][1:], axis=0)
+    slanted = np.ptp(
+        run_all(WindowObserver(model, BOX, horizon=1, template=[[1.0, 0.1], [1.0, -0.5]]), log)[-1][1:], axis=0
+    )
     assert (slanted <= widths[0] * (1 + 1e-6)).all()
     assert slanted[1] < 0.9 * widths[0][1]
 
@@ -245,8 +247,8 @@ def test_an_ample_deadline_changes_nothing() -> None:
 @pytest.mark.parametrize("horizon", [3, None])
 def test_a_saved_state_continues_bit_for_bit(horizon: int | None) -> None:
     model, log = flown(60)
-    whole = run_all(WindowObserver(model, BOX, horizon), log)
-    observer = WindowObserver(model, BOX, horizon)
+    whole = run_all(WindowObserver(model, BOX, horizon=horizon), log)
+    observer = WindowObserver(model, BOX, horizon=horizon)
     for step in islice(drive(observer, log), 25):
         _ = step.box
     file = io.BytesIO()
@@ -287,7 +289,7 @@ def test_nothing_compiles_after_warm_up() -> None:
 @pytest.mark.parametrize("horizon", [1, 2, 10, None])
 def test_warm_up_leaves_the_observer_alone(horizon: int | None) -> None:
     model, log = flown()
-    observer, twin = (WindowObserver(model, BOX, horizon) for _ in range(2))
+    observer, twin = (WindowObserver(model, BOX, horizon=horizon) for _ in range(2))
     run_all(observer, log)
     run_all(twin, log)
     observer.warm_up()

@@ -112,8 +112,10 @@ def test_truth_stays_inside_random_uncertain_plants(seed: int, limits: tuple[int
     y = log.y.copy()
     if rng.random() < 0.5:
         y[rng.random(y.shape) < 0.3] = np.nan
-    sizes = [None if value is None else value * model.n_states for value in limits]
-    observer = ConstrainedZonotopeObserver(model, random_initial(rng, x0), *sizes)
+    generators, constraints = (None if value is None else value * model.n_states for value in limits)
+    observer = ConstrainedZonotopeObserver(
+        model, random_initial(rng, x0), max_generators=generators, max_constraints=constraints
+    )
     for k, step in enumerate(drive(observer, replace(log, y=y))):
         assert step.verdict == "consistent", k
         room = 1e-12 * (1.0 + np.abs(log.x[k]).max())
@@ -130,7 +132,7 @@ def test_without_reduction_it_is_the_full_information_window() -> None:
     log = model.simulate([0.2, 0.1, -0.5], rng.normal(size=(8, 1)), rng)
     box = HPolytope.box(-np.ones(3), np.ones(3))
     full = WindowObserver(model, box, horizon=None).run(log)
-    free = ConstrainedZonotopeObserver(model, box, 1000, 1000).run(log)
+    free = ConstrainedZonotopeObserver(model, box, max_generators=1000, max_constraints=1000).run(log)
     np.testing.assert_allclose(free.lower, full.lower, atol=1e-7)
     np.testing.assert_allclose(free.upper, full.upper, atol=1e-7)
 

@@ -68,7 +68,9 @@ def by_hand(learning: list[Log], judged: Log) -> Any:
     def predictor(log: Log) -> IntervalPredictor:
         return IntervalPredictor(gains, (float(log.y[0, 0]), 0.02))
 
-    noise = NoiseCharacterization.from_records([predictor(log).predict(log).residual for log in learning], 20, 1.2)
+    noise = NoiseCharacterization.from_records(
+        [predictor(log).predict(log).residual for log in learning], 20, safety_factor=1.2
+    )
     return IntervalDetector(predictor(judged), noise, 0.8).run(judged)
 
 

@@ -1,0 +1,17 @@
+"""What an interval detector beside a plant's bank says about a log."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from svo.interval.on_log import ThresholdDetection
+from svo.logs.log import Log
+
+
+@runtime_checkable
+class DetectsThresholds(Protocol):
+    """What a `MonitoredPlant` offers besides if an interval detector runs beside its bank."""
+
+    def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
+        """What that detector says about a log; None if there is none after all."""
+        ...
