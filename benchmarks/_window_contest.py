@@ -59,7 +59,8 @@ class Recording:
 
 def record(observer: WindowObserver, log: Log) -> Recording:
     """Run a fresh observer once and keep what the other solvers need to solve the same windows."""
-    sample, arrays, size = sampler(observer, log), observer._arrays, observer._size
+    sample, memory = sampler(observer, log), observer._window.memory
+    arrays, size = memory.arrays, memory.size
     queries, boxes, answers, slack = [], [], [], []
     new = arrays["new_upper"], arrays["new_lower"]
     for k in range(len(log)):

@@ -51,7 +51,7 @@ def observer_of(model: UncertainModel, horizon: int = HORIZON, schedule: str = "
     initial = HPolytope.box(INITIAL_LOWER, INITIAL_UPPER)
     observer = WindowObserver(model, initial, horizon=horizon)
     if schedule == "every sample":
-        observer._block = 1
+        observer._settings.__dict__["block"] = 1
         observer.reset(initial)
     return observer
 

@@ -16,7 +16,7 @@ from svo.isolation.logic import GLOBAL
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.digest import ModelSample
-from svo.observers.window.chain import ProvingObserver
+from svo.observers.window.chain import promises_of, prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
 from svo.plant import MonitoredPlant, in_architecture, schedule_of
 
@@ -96,26 +96,26 @@ def _with_chain(check: AlarmCheck, alarm: Alarm, models: PlantModels) -> AlarmCh
 
 
 def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
-    proving: dict[str, ProvingObserver] = {}
+    replaced: dict[str, WindowObserver] = {}
     splits: dict[str, int] = {}
     for name in (alarm.observer, *(n for n in bank.observers if n == GLOBAL)):
         observer = bank.observers.get(name)
         if not isinstance(observer, WindowObserver):
             kind = "none of that name" if observer is None else f"a {type(observer).__name__}"
             return False, f"only bounds of window observers can be proven; the plant's bank has {kind} for {name!r}"
-        proving[name], splits[name] = ProvingObserver.like(observer), observer.sign_split
-    bank.exchange(proving)
+        replaced[name], splits[name] = proving(observer), observer.sign_split
+    bank.exchange(replaced)
     started, fell = _replay(bank, alarm.observer, log)
     if fell != alarm.sample:
         found = "not falsified" if fell is None else f"falsified at sample {fell}"
         split = " over convex hulls, not split by signs as the plant's is," if splits[alarm.observer] else ""
         return False, f"run again over the log{split} the plant's observer is {found}"
-    unproven = [what for observer in proving.values() for what in observer.unproven]
-    bounds = sum(observer.checked for observer in proving.values())
+    provers = [prover_of(observer) for observer in replaced.values()]
+    unproven, bounds = [what for p in provers for what in p.unproven], sum(p.checked for p in provers)
     if unproven:
         return False, f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}"
-    own = proving[alarm.observer]
-    again, promises = own.start_at(started), "".join(f" and {promise}" for promise in own.promises)
+    own = replaced[alarm.observer]
+    again, promises = start_of(own, started), "".join(f" and {promise}" for promise in promises_of(own))
     if again is not None:
         return True, f"proven over {bounds} bounds, given {again}{promises}"
     if started == 0:

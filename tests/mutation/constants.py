@@ -74,7 +74,7 @@ CONSTANTS = (
     Constant("svo.analysis.input_design", "_DECREASE", "heuristic"),
     Constant("svo.analysis.sparse_program", "FEASIBILITY", "heuristic"),
     Constant("svo.analysis.model_pair", "_DELTA_TOLERANCE", "heuristic"),
-    Constant("svo.observers.window.restart", "_BLURRED", "heuristic"),
+    Constant("svo.observers.window.observer", "_BLURRED", "heuristic"),
     Constant("svo.observers.window.sign_split", "_INEXACT", "heuristic"),
     Constant("svo.observers.zonotope.zonotope", "_PIVOT", "heuristic"),
     Constant("svo.observers.zonotope.reduction", "_RANK", "heuristic"),

@@ -45,6 +45,10 @@ class WindowCertificate(WindowEvidence, Certificate):
         except NoProof:
             return False
 
+    def resting_on(self, largest_at: int | None) -> WindowCertificate:
+        """The same proof, whose arrival set rests on the largest set at a sample."""
+        return replace(self, largest_at=largest_at)
+
     def premise(self, sample: int) -> str:
         known = "the readings of its window alone" if self.arrival.is_unknown else "the arrival set"
         return known + started_again(self.largest_at, self.last, sample)

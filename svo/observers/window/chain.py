@@ -1,7 +1,7 @@
 """The whole chain of a falsification: every bound from the first sample to the alarm, in exact arithmetic.
 
 What a window proves is conditional on its arrival set and on the bounds of its channels' s. Run again over the log
-with `ProvingObserver`, each of those bounds is checked when it is made: the multipliers of its program prove, by weak
+with a `BoundProver`, each of those bounds is checked when it is made: the multipliers of its program prove, by weak
 duality in rational arithmetic, a bound that is no larger. By induction the alarm then follows from the initial set, the
 model and the log alone; where the set started again, from the largest set there, or from the readings since.
 """
@@ -11,20 +11,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
 
 from flint import fmpq
 
 from svo.checks import Array
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.observers import window_kernel as kernel
-from svo.observers.answers import VerdictName
 from svo.observers.window.certificate import WindowCertificate
-from svo.observers.window.evidence import ArrivalSet
+from svo.observers.window.memory import Memory
 from svo.observers.window.observer import WindowObserver
-from svo.observers.window.sign_split import SplitCertificate
 from svo.observers.window.weak_duality import exact
+from svo.observers.window.window import Window
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +101,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
                 f"late[{i}] was taken at sample {measurement.taken} and arrived after {measurement.arrived}; expected "
                 f"0 <= taken <= arrived <= {len(log) - 1}, the last sample of the log"
             )
-    again = ProvingObserver.like(observer)
+    again = proving(observer)
     at = None
     for k, step in enumerate(drive(again, log)):
         for measurement in waiting:
@@ -113,20 +110,52 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
         if step.verdict == "falsified":
             at = k
             break
-    certificate = again.certificate
+    prover = prover_of(again)
+    certificate = step.certificate
+    assert certificate is None or isinstance(certificate, WindowCertificate)  # it keeps the hulls
     return ChainCheck(
-        proven=at is not None and not again.unproven,
+        proven=at is not None and not prover.unproven,
         falsified_at=at,
-        bounds=again.checked,
-        unproven=tuple(again.unproven),
+        bounds=prover.checked,
+        unproven=tuple(prover.unproven),
         certificate=certificate,
         seconds=perf_counter() - begun,
-        given=(again.start_at(0) or "the first set", *again.promises),
+        given=(start_of(again, 0) or "the first set", *promises_of(again)),
     )
 
 
-class ProvingObserver(WindowObserver):
-    """A window observer that proves each bound that it keeps.
+def proving(observer: WindowObserver) -> WindowObserver:
+    """An observer like another, before its first sample, that has each bound proven that it keeps."""
+    return observer.proving(BoundProver)
+
+
+def prover_of(observer: WindowObserver) -> BoundProver:
+    """Where an observer that `proving` gave stands."""
+    assert isinstance(observer.prover, BoundProver)
+    return observer.prover
+
+
+def start_of(observer: WindowObserver, shift: int) -> str | None:
+    """Where a set that started again did, its samples counted from ``shift``; None for the set it was given."""
+    if observer.largest_at is not None:
+        return f"the largest set at sample {shift + observer.largest_at}, where the set started again"
+    if observer.free_since is not None:
+        return f"nothing before sample {shift + observer.free_since}, from which on the readings alone bound the state"
+    return None
+
+
+def promises_of(observer: WindowObserver) -> tuple[str, ...]:
+    """What is promised of the plant at all times, besides its model."""
+    return () if observer.model.physical_range is None else ("the physical range",)
+
+
+class BoundProver:
+    """Proves the bounds of a window by the multipliers of the programs that gave them.
+
+    Parameters
+    ----------
+    free : bool
+        Whether the window's readings gave its first set: that bound has been proven where it was found.
 
     Attributes
     ----------
@@ -136,121 +165,57 @@ class ProvingObserver(WindowObserver):
         Those whose multipliers do not prove them.
     """
 
-    checked: int
-    unproven: list[str]
+    def __init__(self, free: bool) -> None:
+        self.checked, self.unproven = int(free), list[str]()
 
-    @classmethod
-    def like(cls, observer: WindowObserver) -> ProvingObserver:
-        """One with the settings and the initial set of another, before its first sample."""
-        again = cls.__new__(cls)
-        again._configure(observer._form, observer.horizon, observer._template, observer.eps, 0)
-        again.checked, again.unproven = 0, []
-        again._begin_first(observer._initial)
-        return again
-
-    def start_at(self, shift: int) -> str | None:
-        """Where a set that started again did, its samples counted from ``shift``; None for the set it was given."""
-        if self.largest_at is not None:
-            return f"the largest set at sample {shift + self.largest_at}, where the set started again"
-        if self._free:
-            return f"nothing before sample {shift + self._origin}, from which on the readings alone bound the state"
-        return None
-
-    @property
-    def promises(self) -> tuple[str, ...]:
-        """What is promised of the plant at all times, besides its model."""
-        return () if self.model.physical_range is None else ("the physical range",)
-
-    @property
-    def certificate(self) -> WindowCertificate | None:
-        """Of the falsification, once there is one."""
-        assert not isinstance(self._falsified, SplitCertificate)  # it keeps the hulls
-        return self._falsified
-
-    def _start(self, arrival: ArrivalSet, number: int, free: bool = False) -> None:
-        super()._start(arrival, number, free)
-        # Nothing before is used any more. Bounds by readings alone have been proven where they were found.
-        self.checked, self.unproven = int(free), []
-
-    def _take(self, data: tuple[Any, ...]) -> VerdictName:
-        self._enter(data)
-        return self._solve(kernel.ARRIVAL)
-
-    def _solve(self, task: int) -> VerdictName:
-        if task != kernel.ARRIVAL:
-            return super()._solve(task)
-        clock, size, decided = self._arrays["clock"], self._size, False
-        base, time = int(clock[kernel.BASE]), int(clock[kernel.TIME])
-        for program in range(*kernel.arrival_programs.py_func(size, base, time)):
-            verdict = self._solve_one(task, program)
-            if verdict == kernel.EMPTY_CANDIDATE and self._prove():
-                return "falsified"
-            decided = decided or verdict == kernel.CONSISTENT
-            if time - base > size.N - size.block:
-                self._check_arrival(program, base + size.block)
-        return "consistent" if decided else self._ask_highs()
-
-    def _settle_channels(self, sign_open: bool, reaching: bool, end: float | None = None) -> None:
-        """As the observer does; each bound of s is then proven."""
-        size, w = self._size, self._arrays
-        if not reaching and self._last_bounds is None:
-            return  # no transition leads to the first sample
-        v = self._time % (size.N + size.late)
-        for q in self._channels(reaching):
-            for side in range(2):
-                program = 2 * q + side
-                is_open = sign_open and w["s_lower"][v, q] < 0.0 < w["s_upper"][v, q]
-                if is_open:
-                    self._solve_one(kernel.CHANNELS, program)
-                self._check_channel(v, q, side, 4 * size.nt + program if is_open else None)
-
-    def _check_arrival(self, program: int, target: int) -> None:
-        i, lower = program // 2, program % 2 == 1
-        bound = exact(-self._arrays["new_lower"][i] if lower else self._arrays["new_upper"][i])
-        direction = -self._arrays["T"][i] if lower else self._arrays["T"][i]
-        proven = self._proven(program, target, direction)
-        what = f"arrival bound {program} of sample {target + self._origin}"
+    def arrival(self, window: Window, program: int) -> None:
+        """The bound of the next arrival set that a program has just given."""
+        w, i, lower = window.memory.arrays, program // 2, program % 2 == 1
+        target = window.memory.base + window.memory.size.block
+        bound = exact(-w["new_lower"][i] if lower else w["new_upper"][i])
+        proven = _proven(window, program, target, -w["T"][i] if lower else w["T"][i])
+        what = f"arrival bound {program} of sample {target + window.origin}"
         self._count(proven is not None and proven <= bound, what)
 
-    def _check_channel(self, v: int, q: int, side: int, basis: int | None) -> None:
+    def channel(self, window: Window, q: int, side: int, is_open: bool) -> None:
         """s = f'(x, u, 1, w) <= s_upper, or -s <= -s_lower, by the program's multipliers or by none at all."""
-        w, size = self._arrays, self._size
-        time = int(w["clock"][kernel.TIME])
-        sign = 1.0 - 2.0 * side
-        f = sign * w["functional"][v, q]
-        bound = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q])
-        known = self._known_part(f, time, v)
-        bases = [None] if basis is None else [basis, None]
-        proofs = [self._proven(b, time, f[: size.n]) for b in bases]
+        memory, w, size = window.memory, window.memory.arrays, window.memory.size
+        v, time = memory.variables, memory.time
+        f = (1.0 - 2.0 * side) * w["functional"][v, q]
+        bound, known = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q]), _known_part(memory, f)
+        bases = [4 * size.nt + 2 * q + side, None] if is_open else [None]
+        proofs = [_proven(window, basis, time, f[: size.n]) for basis in bases]
         holds = any(proof is not None and proof + known <= bound for proof in proofs)
-        what = f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time + self._origin}"
+        what = f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time + window.origin}"
         self._count(holds, what)
-
-    def _known_part(self, f: Array, time: int, v: int) -> fmpq:
-        """Largest value of what u, the constant and w contribute to f'(x, u, 1, w)."""
-        w, n, nu = self._arrays, self._size.n, self._size.nu
-        total = exact(f[n + nu])
-        for value, u in zip(f[n : n + nu], w["u"][time % (self._size.N + 1)], strict=True):
-            total += exact(value) * exact(u)
-        for value, low, high in zip(f[n + nu + 1 :], w["w_lower"][v], w["w_upper"][v], strict=True):
-            total += exact(value) * exact(high if value > 0 else low)
-        return total
-
-    def _proven(self, basis: int | None, sample: int, direction: Array) -> fmpq | None:
-        """The bound of a direction (in normal form) at a sample that multipliers prove about the model as it is given.
-
-        They are those of the program solved last, whose basis is given; None: without any. The sample is one of the
-        window, as the kernel counts.
-        """
-        w = self._arrays
-        w["farkas"][:] = 0.0
-        if basis is not None:
-            k = int(w["k"][basis])
-            w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
-        found = self._certificate((sample, direction))
-        return found.proven_bound(sample + self._origin, direction / self._form.x)
 
     def _count(self, holds: bool, what: str) -> None:
         self.checked += 1
         if not holds:
             self.unproven.append(what)
+
+
+def _known_part(memory: Memory, f: Array) -> fmpq:
+    """Largest value of what u, the constant and w of the newest sample contribute to f'(x, u, 1, w)."""
+    w, n, nu, v = memory.arrays, memory.size.n, memory.size.nu, memory.variables
+    total = exact(f[n + nu])
+    for value, u in zip(f[n : n + nu], w["u"][memory.slot], strict=True):
+        total += exact(value) * exact(u)
+    for value, low, high in zip(f[n + nu + 1 :], w["w_lower"][v], w["w_upper"][v], strict=True):
+        total += exact(value) * exact(high if value > 0 else low)
+    return total
+
+
+def _proven(window: Window, basis: int | None, sample: int, direction: Array) -> fmpq | None:
+    """The bound of a direction (in normal form) at a sample that multipliers prove about the model as it is given.
+
+    They are those of the program solved last, whose basis is given; None: without any. The sample is one of the
+    window, as the kernel counts.
+    """
+    w = window.memory.arrays
+    w["farkas"][:] = 0.0
+    if basis is not None:
+        k = int(w["k"][basis])
+        w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
+    found = window.certificate((sample, direction))
+    return found.proven_bound(sample + window.origin, direction / window.settings.form.x)

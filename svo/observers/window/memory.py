@@ -1,28 +1,19 @@
-"""A window in the kernel's memory, in normal form: its sizes, its arrays, what the certificate of its multipliers is
-made of."""
+"""The memory of a window: what is fixed of its observer, and the kernel's arrays in one block; all in normal form."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.models.normal_form import ENORMOUS, NormalForm
+from svo.models.normal_form import NormalForm
 from svo.observers import window_kernel as kernel
-from svo.observers.given_units import window_out
-from svo.observers.window.certificate import WindowCertificate, certificate_of
-from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.output_injection import OutputInjection, can_inject
-from svo.observers.window.setup import (
-    channel_owners,
-    disturbance_rows,
-    jitter,
-    needs_next_input,
-    output_is_disturbed,
-)
-from svo.observers.window.sign_split import SplitCertificate
+from svo.observers.window.setup import channel_owners, disturbance_rows, jitter, output_is_disturbed
 
 _GROWING_START = 16
 _LARGEST_BASIS = 128
@@ -30,114 +21,125 @@ _LARGEST_GROWING_BASIS = 256
 _MOST_BYTES = 8 * 2**30
 
 
-class WindowMemory:
-    """Arrays of a window, anchored at a set of first states, and what is fixed of its model; all in normal form.
+@dataclass(frozen=True, eq=False)
+class WindowSettings:
+    """What every window of an observer has in common.
 
     Attributes
     ----------
-    model : UncertainModel
+    form : NormalForm
     horizon : int or None
+    template : (r, n) array
+        In normal form.
     eps : float
     sign_split : int
         As in `svo.WindowObserver`.
-    largest_at : int or None
-        Sample at which the set last started from the model's largest set, if what is known now rests on it.
     """
 
-    largest_at: int | None
+    form: NormalForm
+    horizon: int | None
+    template: Array
+    eps: float
+    sign_split: int
 
-    def _configure(self, form: NormalForm, horizon: int | None, template: Array, eps: float, sign_split: int) -> None:
-        self.model, self._form, self._normal, model = form.given, form, form.model, form.model
-        self.sign_split = sign_split
-        self.horizon = None if horizon is None else int(horizon)
-        self.eps = float(eps)
-        self._block = 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
-        self._template = template
-        self._owner = channel_owners(model)
-        self._late = output_is_disturbed(model)
-        sizes = model.n_states, model.n_inputs, model.n_disturbances
-        self._injection = OutputInjection(*sizes) if can_inject(model) else None
-        self._wants_next_input = needs_next_input(model)
+    @cached_property
+    def block(self) -> int:
+        """Samples that the window slides by."""
+        return 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
 
     @property
-    def _first_steps(self) -> int:
+    def first_steps(self) -> int:
         """Steps that an empty window has room for."""
-        return _GROWING_START if self.horizon is None else self.horizon + self._block - 1
+        return _GROWING_START if self.horizon is None else self.horizon + self.block - 1
 
-    def _begin(self, anchor: ArrivalSet, steps: int, origin: int = 0, free: bool = False) -> None:
-        """An empty window of so many steps at most, anchored at a set of first states.
+    @cached_property
+    def owner(self) -> NDArray[np.int64]:
+        """Item of the stack that each channel belongs to."""
+        return channel_owners(self.form.model)
 
-        Its first sample is the observer's ``origin``; ``free`` says that the set follows from the window's readings.
-        """
-        self._anchor, self._origin, self._free = anchor, origin, free
-        self._allocate(steps)
-        n, w = self._normal.n_states, self._arrays
-        w["h_lower"][:n], w["h_upper"][:n] = anchor.box_lower, anchor.box_upper
-        kernel.initialise(self._window, self._size, anchor.rows, anchor.lower, anchor.upper)
-        self._falsified: WindowCertificate | SplitCertificate | None = None
-        self._reading: Array | None = None  # the newest one, as it was given
-        self._last_bounds: tuple[Array, Array] | None = None
+    @cached_property
+    def late(self) -> bool:
+        """Whether w and channels enter the output, so that they take part at their own sample."""
+        return output_is_disturbed(self.form.model)
 
-    def _allocate(self, steps: int) -> None:
-        model = self._form.model
-        n = model.n_states
-        nw = model.n_disturbances + (0 if self._injection is None else n)
-        w_rows = disturbance_rows(self._form)
-        nv, nr = nw + len(self._owner), model.n_outputs + len(w_rows[0]) + 2 * len(self._owner)
-        na = max(len(self._template), len(self._anchor.rows))
+    @cached_property
+    def injection(self) -> OutputInjection | None:
+        """Where exact sensors read the disturbance."""
+        model = self.form.model
+        sizes = model.n_states, model.n_inputs, model.n_disturbances
+        return OutputInjection(*sizes) if can_inject(model) else None
+
+
+class Memory:
+    """The kernel's arrays by name, anchored at nothing yet.
+
+    Attributes
+    ----------
+    size : Sizes
+    arrays : dict of str to array
+    kernel : the arrays as the kernel takes them
+    """
+
+    def __init__(self, settings: WindowSettings, anchor_rows: int, steps: int) -> None:
+        model, owner, template = settings.form.model, settings.owner, settings.template
+        n, nq, injection = model.n_states, len(owner), settings.injection
+        nw = model.n_disturbances + (0 if injection is None else n)
+        w_rows = disturbance_rows(settings.form)
+        nv, nr = nw + nq, model.n_outputs + len(w_rows[0]) + 2 * nq
+        na = max(len(template), anchor_rows)
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
-        largest = _LARGEST_BASIS if self.horizon is not None else _LARGEST_GROWING_BASIS
-        size = kernel.Sizes(
-            n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=len(self._owner), nh=len(w_rows[0]),
-            nt=n + len(self._template), na=na, ni=1 + len(model.uncertainties), N=steps, block=self._block,
-            K=min(rows, columns, largest) + 2, late=int(self._late),
+        largest = _LARGEST_BASIS if settings.horizon is not None else _LARGEST_GROWING_BASIS
+        self.size = kernel.Sizes(
+            n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=nq, nh=len(w_rows[0]), nt=n + len(template), na=na,
+            ni=1 + len(model.uncertainties), N=steps, block=settings.block, K=min(rows, columns, largest) + 2,
+            late=int(settings.late),
         )  # fmt: skip
-        w, self._size = _room_for(size), size
-        self._arrays = w
+        w = self.arrays = _room_for(self.size)
         w["T"][:n] = np.eye(n)
-        w["T"][n:] = self._template
-        w["owner"][:] = self._owner
-        w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in self._owner]).reshape(-1, 2)
+        w["T"][n:] = template
+        w["owner"][:] = owner
+        w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in owner]).reshape(-1, 2)
         w["w_rows"][:, : model.n_disturbances], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
         w["jitter"][:] = jitter(w["jitter"].size)
-        self._window = kernel.new_window(dict(w))
-        if self._injection is not None:
-            w |= self._injection.allocate(self._size)
-
-    def _grow(self) -> None:
-        """Twice the room; nothing has wrapped around yet, so every array is a leading block of the larger one."""
-        old = self._arrays
-        self._allocate(2 * self._size.N)
-        for name, small in old.items():
-            self._arrays[name][tuple(slice(0, length) for length in small.shape)] = small
+        self.kernel = kernel.new_window(dict(w))
+        if injection is not None:
+            w |= injection.allocate(self.size)
 
     @property
-    def _time(self) -> int:
+    def time(self) -> int:
         """Newest sample, as the kernel counts from the start of its window."""
-        return int(self._arrays["clock"][kernel.TIME])
+        return int(self.arrays["clock"][kernel.TIME])
 
-    def _arrival(self) -> ArrivalSet:
-        if self._arrays["clock"][kernel.BASE] == 0:
-            return self._anchor
-        n, lower, upper = self.model.n_states, self._arrays["h_lower"].copy(), self._arrays["h_upper"].copy()
-        return ArrivalSet(lower[:n], upper[:n], self._template, lower[n:], upper[n:])
+    @property
+    def base(self) -> int:
+        """Oldest sample."""
+        return int(self.arrays["clock"][kernel.BASE])
 
-    def _certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
-        """Of the multipliers at hand, about the model and the data as given.
+    @property
+    def started(self) -> bool:
+        return bool(self.arrays["clock"][kernel.STARTED])
 
-        ``objective`` is a sample of the window, as the kernel counts, and a direction, in normal form, whose bound is
-        to be proven.
-        """
-        if self._injection is not None:
-            found = self._injection.certificate(self._arrays, self._size, self._arrival(), objective)
-        else:
-            found = certificate_of(self._arrays, self._size, self._arrival())
-        found = replace(found, first=found.first + self._origin, last=found.last + self._origin)
-        given, beyond = window_out(found, self._form), np.abs(found.samples[-1].y) == ENORMOUS
-        if self._reading is None or not beyond.any():
-            return given
-        newest = replace(given.samples[-1], y=np.where(beyond, self._reading, given.samples[-1].y))
-        return replace(given, samples=(*given.samples[:-1], newest))
+    @property
+    def slot(self) -> int:
+        """Where the data of the newest sample are."""
+        return self.time % (self.size.N + 1)
+
+    @property
+    def variables(self) -> int:
+        """Where the variables of the newest sample are that has any."""
+        return self.time % (self.size.N + self.size.late)
+
+    def copy_from(self, smaller: Memory) -> None:
+        """What a smaller one holds whose samples have not wrapped around: every array is a leading block of its own."""
+        for name, small in smaller.arrays.items():
+            self.arrays[name][tuple(slice(0, length) for length in small.shape)] = small
+
+    def check_clock(self) -> None:
+        """Raise ValueError unless the clock is one."""
+        clock, base, time, steps = self.arrays["clock"], self.base, self.time, self.size.N
+        flags = clock[[kernel.STARTED, kernel.PENDING]]
+        if not (0 <= base <= time <= base + steps and np.isin(flags, (0, 1)).all() and (clock >= 0).all()):
+            raise ValueError(f"its window holds samples {base} to {time}; expected at most {steps} steps from 0 on")
 
 
 def _room_for(size: kernel.Sizes) -> dict[str, Any]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -20,15 +20,21 @@ from svo.observers.answers import VerdictName
 from svo.observers.base import Observer
 from svo.observers.data import relative_slack
 from svo.observers.first_states import first_box
+from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
-from svo.observers.saved_state import take_exactly
+from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
 from svo.observers.window.evidence import ArrivalSet
-from svo.observers.window.restart import RestartingWindow
-from svo.observers.window.setup import arrival_of, template_rows
+from svo.observers.window.memory import WindowSettings
+from svo.observers.window.sample import Outgrown, Sample, check_matrices
+from svo.observers.window.setup import arrival_of, needs_next_input, template_rows
 from svo.observers.window.step import WindowStep
+from svo.observers.window.window import Prover, Window
+
+_BLURRED = 1e-3  # of a reading's own width: the share of its slack by the width of the set from which a restart pays
+_LONGEST = 10  # samples without a sensor after which its return may call for one, where the window has no end
 
 
-class WindowObserver(RestartingWindow, Observer):
+class WindowObserver(Observer):
     """Set-valued observer over a moving window of N steps (the lifted form of paper 002, section 2).
 
     The window holds the state at its first sample, every disturbance and every channel of uncertainty since;
@@ -88,114 +94,194 @@ class WindowObserver(RestartingWindow, Observer):
         rows = template_rows(template, model.n_states)
         lower, upper = first_box(initial, model)
         form = NormalForm.at(model, lower, upper)
-        self._configure(form, horizon, rows * form.x, slack, int(sign_split))
+        steps = None if horizon is None else int(horizon)
+        self._configure(WindowSettings(form, steps, rows * form.x, slack, int(sign_split)))
         self._reset(initial, lower, upper)
+
+    def _configure(self, settings: WindowSettings, prover: Callable[[bool], Prover] | None = None) -> None:
+        """Settings, and what makes a prover of a window whose anchor follows from its readings, or does not."""
+        self.model, self._settings, self._form = settings.form.given, settings, settings.form
+        self.horizon, self.eps, self.sign_split = settings.horizon, settings.eps, settings.sign_split
+        self._normal, self._make_prover = settings.form.model, prover
+        self._wants_next_input = needs_next_input(self._normal)
+        self.prover = None if prover is None else prover(False)
 
     @property
     def needs_next_input(self) -> bool:
         return self._wants_next_input
 
+    @property
+    def free_since(self) -> int | None:
+        """Sample from which on the readings alone bound the state, if the set last started again from them."""
+        return self._window.origin if self._window.free else None
+
+    @property
+    def stopped(self) -> int:
+        """Programs so far that ended at the limit of pivots or of the basis: their bounds hold, yet could be less."""
+        return int(self._window.memory.arrays["clock"][kernel.STOPS])
+
+    @property
+    def directions(self) -> Array:
+        """Directions (nt, n) in which the arrival set and `WindowStep.set` are bounded: the axes, then the template."""
+        return np.vstack([np.eye(self.model.n_states), self._settings.template / self._form.x])
+
+    def bounds_at(self, sample: int) -> tuple[Array, Array]:
+        """Bounds of the state at the newest sample in `directions`; the axes come first."""
+        self._check_current(sample)
+        unit = np.append(self._form.x, np.ones(len(self._settings.template)))
+        lower, upper = self._newest_bounds(None if self._lost else self._window)
+        return lower * unit, upper * unit
+
+    def support_at(self, sample: int, directions: Array) -> Array:
+        """Bounds of the state at the newest sample in any directions."""
+        self._check_current(sample)
+        if self._lost:
+            values = np.full(len(directions), np.inf)
+        else:
+            values = np.array([self._window.support(direction * self._form.x) for direction in directions])
+        physical = self.model.physical_range
+        return values if physical is None else np.minimum(values, physical.support(directions))
+
+    def proving(self, prover: Callable[[bool], Prover]) -> WindowObserver:
+        """An observer with these settings and first set, before its first sample, whose bounds a prover is shown.
+
+        Convex hulls are kept where this one splits by signs.
+        """
+        again = copy(self)
+        again._configure(replace(self._settings, sign_split=0), prover)
+        again._forget()
+        again._begin(self._initial)
+        return again
+
     # -- the hooks -------------------------------------------------------------------------------
 
     def _reset(self, set: HPolytope, lower: Array, upper: Array) -> None:
-        self._begin_first(arrival_in(arrival_of(set, lower, upper), self._form))
+        self._begin(arrival_in(arrival_of(set, lower, upper), self._form))
+
+    def _begin(self, initial: ArrivalSet) -> None:
+        """Nothing is known but a set of first states."""
+        self._initial = initial
+        self._lost = False
+        self._readings: Readings | None = None  # of a set that is lost, or too wide
+        self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)  # samples since each sensor was read
+        self._window = Window(self._settings, initial, prover=self.prover)
+
+    def _lose_set(self) -> None:
+        largest = self._normal.start_range
+        if largest is None:
+            self._lose()
+        else:
+            self._begin(ArrivalSet.box(largest.lower, largest.upper))
+            self.largest_at, self._missing[:] = 0, self._horizon_of_gaps
 
     def _update(self, y: Array, u: Array, schedule: Any) -> WindowStep:
-        return self._sample(True, np.zeros(self.model.n_inputs), u, y, schedule)
+        return self._said(self._take(self._sample(np.zeros(self.model.n_inputs), u, y, schedule), None))
 
     def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> WindowStep:
-        if self.horizon is None and not self._lost and self._time + 1 >= self._size.N:
-            self._grow()
-        return self._sample(False, u, u_next, y, schedule, end)
+        return self._said(self._take(self._sample(u, u_next, y, schedule), end))
+
+    @property
+    def _oldest(self) -> int:
+        if self._lost:
+            assert self._readings is not None
+            return self._number - len(self._readings.samples) + 1
+        return self._window.oldest
+
+    def _read_at(self, sample: int) -> Array:
+        if self._lost:
+            assert self._readings is not None
+            return self._readings.samples[sample - self._oldest].y
+        return self._window.read_at(sample)
 
     def _late_update(self, y: Array, sample: int) -> WindowStep:
-        return self._said(self._take_late(self._form.outputs(y), sample))
-
-    def _options(self) -> dict[str, Any]:
-        rows, horizon, cells = self._template / self._form.x, self.horizon, self.sign_split
-        return {"horizon": horizon, "template": rows, "eps": self.eps, "sign_split": cells}
-
-    def _state(self) -> dict[str, NDArray[Any]]:
-        settings = np.array([-1.0 if self.horizon is None else self.horizon, self._size.N, self.eps, self.sign_split])
-        first = {f"initial.{f.name}": getattr(self._initial, f.name) for f in fields(self._initial)}
-        last = dict(zip(("w_old_lower", "w_old_upper"), self._last_bounds or (), strict=False))
-        falsified = np.array(float(self._alarm is not None))
-        state = {"settings": settings, "falsified": falsified, "template": self._template, **first, **last}
-        return state | self._form.state_dict() | self._arrays | self._restart_state()
-
-    def _set_up(self, model: UncertainModel, state: Mapping[str, NDArray[Any]]) -> None:
-        horizon, _, eps, cells = (float(v) for v in state["settings"])
-        form = NormalForm.from_state_dict(model, state)
-        self._configure(form, None if horizon < 0 else int(horizon), state["template"], eps, int(cells))
-
-    def _resume(self, state: Mapping[str, NDArray[Any]]) -> WindowStep | None:
-        steps, falsified = int(state["settings"][1]), bool(state["falsified"])
-        self._begin_first(ArrivalSet(**{f.name: np.array(state[f"initial.{f.name}"]) for f in fields(ArrivalSet)}))
-        self._restore_restart(state, steps)
-        take_exactly(self._arrays, state)
-        if not self._lost:
-            self._number = self._origin + self._time if self._arrays["clock"][kernel.STARTED] else -1
-        if "w_old_lower" in state:
-            self._last_bounds = (np.array(state["w_old_lower"]), np.array(state["w_old_upper"]))
-        self._check_restored(falsified)
-        return self._said("falsified") if falsified else None
+        known = self._form.outputs(y)
+        if self._readings is not None:
+            self._readings.add_late(known, self._number - sample)
+        if self._lost:
+            return self._said(self._start_from_readings() or "undecided")
+        return self._said(self._window.add_late(known, sample))
 
     def _warm_up(self) -> None:
         other = copy(self)
+        other._make_prover = other.prover = None
         other._forget()
-        other._begin_first(self._initial)
+        other._begin(self._initial)
         y, u = np.full(self.model.n_outputs, np.nan), np.zeros(self.model.n_inputs)
         schedule = self.model.schedule
         other.update(y, u, schedule)
         other.step(u, y, u, schedule).box  # noqa: B018
         other.step(u, y, u, schedule, deadline=0.0)
         other.late_update(y, other.window[0])
-        kernel.channel_factors(self._form.model.stack(schedule), self._owner, self._arrays["delta"])
+        kernel.channel_factors(self._normal.stack(schedule), self._settings.owner, other._window.memory.arrays["delta"])
 
-    @property
-    def stopped(self) -> int:
-        """Programs so far that ended at the limit of pivots or of the basis: their bounds hold, yet could be less."""
-        return int(self._arrays["clock"][kernel.STOPS])
+    # -- saved states ------------------------------------------------------------------------------------
 
-    @property
-    def directions(self) -> Array:
-        """Directions (nt, n) in which the arrival set and `WindowStep.set` are bounded: the axes, then the template."""
-        return np.vstack([np.eye(self.model.n_states), self._template / self._form.x])
+    def _options(self) -> dict[str, Any]:
+        rows, horizon, cells = self._settings.template / self._form.x, self.horizon, self.sign_split
+        return {"horizon": horizon, "template": rows, "eps": self.eps, "sign_split": cells}
 
-    def bounds_at(self, sample: int) -> tuple[Array, Array]:
-        """Bounds of the state at the newest sample in `directions`; the axes come first."""
-        self._check_current(sample)
-        unit = np.append(self._form.x, np.ones(len(self._template)))
-        lower, upper = self._newest_bounds()
-        return lower * unit, upper * unit
+    def _state(self) -> dict[str, NDArray[Any]]:
+        window, lost = self._window, self._lost
+        horizon = -1.0 if self.horizon is None else self.horizon
+        largest = NO_SAMPLE if self.largest_at is None else self.largest_at
+        numbers = [window.origin, window.free, lost, self._number if lost else -1, largest, self._readings is not None]
+        state: dict[str, NDArray[Any]] = {
+            "settings": np.array([horizon, window.memory.size.N, self.eps, self.sign_split]),
+            "falsified": np.array(float(self._alarm is not None)),
+            "template": self._settings.template,
+            "restart": np.array(numbers, dtype=np.int64),
+            "missing": self._missing,
+        }
+        state |= {f"initial.{f.name}": getattr(self._initial, f.name) for f in fields(ArrivalSet)}
+        if self._readings is not None:
+            state |= self._readings.state()
+        return state | self._form.state_dict() | window.state()
 
-    def support_at(self, sample: int, directions: Array) -> Array:
-        """Bounds of the state at the newest sample in any directions."""
-        self._check_current(sample)
-        values = np.full(len(directions), np.inf)
-        for i, direction in enumerate(directions if not self._lost else ()):
-            self._arrays["query"][:] = direction * self._form.x
-            self._solve(kernel.QUERY)
-            values[i] = self._arrays["answer"][0]
-        physical = self.model.physical_range
-        return values if physical is None else np.minimum(values, physical.support(directions))
+    def _set_up(self, model: UncertainModel, state: Mapping[str, NDArray[Any]]) -> None:
+        horizon, _, eps, cells = (float(v) for v in state["settings"])
+        form, steps = NormalForm.from_state_dict(model, state), None if horizon < 0 else int(horizon)
+        self._configure(WindowSettings(form, steps, state["template"], eps, int(cells)))
+
+    def _resume(self, state: Mapping[str, NDArray[Any]]) -> WindowStep | None:
+        origin, free, lost, lost_at, largest, has_readings = (int(v) for v in state["restart"])
+        self._initial, anchor = (
+            ArrivalSet(**{f.name: np.array(state[f"{name}.{f.name}"]) for f in fields(ArrivalSet)})
+            for name in ("initial", "anchor")
+        )
+        falsified = bool(state["falsified"])
+        self._window = Window(self._settings, anchor, int(state["settings"][1]), origin, bool(free))
+        self._window.resume(state, falsified)
+        self._lost, self._number = bool(lost), lost_at if lost else self._window.newest
+        self.largest_at = None if largest == NO_SAMPLE else largest
+        self._missing = np.array(state["missing"], dtype=np.int64)
+        self._readings = None
+        if has_readings:
+            self._readings = self._new_readings()
+            self._readings.restore(state)
+        return self._said("falsified") if falsified else None
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _sample(
-        self, first: bool, u: Array, u_next: Array, y: Array, schedule: Any, end: float | None = None
-    ) -> WindowStep:
-        form, self._reading = self._form, y
-        stack, (*w, noise) = form.model.stack(schedule), form.model.bounds(schedule)
-        known = form.inputs(u), form.inputs(u_next), form.outputs(y)
-        data = (self._window, self._size, first, *known, stack, noise, *(self._last_bounds or w), *w)
-        verdict = self._answer(data, end)
-        self._last_bounds = w[0], w[1]
-        return self._said(verdict)
+    def _sample(self, u: Array, u_next: Array, y: Array, schedule: Any) -> Sample:
+        """Model and data of a sample, in normal form."""
+        form = self._form
+        stack, (w_lower, w_upper, noise) = self._normal.stack(schedule), self._normal.bounds(schedule)
+        return Sample(form.inputs(u), form.inputs(u_next), form.outputs(y), stack, noise, w_lower, w_upper, y)
+
+    def _take(self, sample: Sample, end: float | None) -> VerdictName:
+        if self._lost:
+            check_matrices(sample.stack)
+            return self._without_set(sample)
+        try:
+            verdict = self._window.take(sample, end)
+        except Outgrown:
+            return self._give_up(sample)
+        return verdict if verdict == "falsified" else self._watch(sample, verdict)
 
     def _said(self, verdict: VerdictName) -> WindowStep:
-        reason = self._reason if verdict == "undecided" else None
-        return WindowStep(self, verdict=verdict, certificate=self._falsified, reason=reason)
+        reason = (OUTGROWN if self._lost else self._window.reason) if verdict == "undecided" else None
+        proof = None if self._window.proof is None else self._window.proof.resting_on(self.largest_at)
+        return WindowStep(self, verdict=verdict, certificate=proof, reason=reason)
 
     def _check_current(self, sample: int) -> None:
         if sample != self._number or self._alarm is not None:
@@ -203,3 +289,124 @@ class WindowObserver(RestartingWindow, Observer):
             raise ValueError(
                 f"the set of sample {sample} was not read before {came}; read it right after its step, or use run(log)"
             )
+
+    def _newest_bounds(self, window: Window | None) -> tuple[Array, Array]:
+        """Bounds of the newest state in the template's directions, within the physical range; the axes come first."""
+        rows = self._window.memory.arrays["T"]
+        if window is None:
+            lower, upper = np.full(len(rows), -np.inf), np.full(len(rows), np.inf)
+        else:
+            lower, upper = window.newest_bounds()
+        physical = self._normal.physical_range
+        if physical is not None:
+            lower, upper, _ = physical.along(rows).cut(lower, upper)
+        return lower, upper
+
+    # -- the set is gone ---------------------------------------------------------------------------
+
+    def _give_up(self, sample: Sample) -> VerdictName:
+        """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
+        largest = self._normal.start_range
+        if largest is not None:
+            window = self._new_window(ArrivalSet.box(largest.lower, largest.upper), self._number)
+            try:
+                verdict = window.take(sample)
+            except Outgrown:
+                pass  # it is itself beyond all bounds
+            else:
+                self._adopt(window)
+                self.largest_at, self._missing[:] = self._number, self._horizon_of_gaps
+                return verdict
+        self._lose()
+        return self._without_set(sample)
+
+    def _lose(self) -> None:
+        """There is no set any more."""
+        self.largest_at, self._lost, self._readings = None, True, self._new_readings()
+        self._window = Window(self._settings, self._window.anchor, prover=self.prover)
+
+    def _without_set(self, sample: Sample) -> VerdictName:
+        assert self._readings is not None
+        self._readings.add(sample.u, sample.reading)
+        return self._start_from_readings() or "undecided"
+
+    def _new_readings(self) -> Readings:
+        return Readings(self._normal, self.eps, self.horizon or 0)
+
+    def _new_window(self, anchor: ArrivalSet, origin: int, free: bool = False) -> Window:
+        """Nothing before it is used any more; bounds by readings alone have been proven where they were found."""
+        prover = None if self._make_prover is None else self._make_prover(free)
+        return Window(self._settings, anchor, origin=origin, free=free, prover=prover)
+
+    def _adopt(self, window: Window) -> None:
+        """Go on with a window that has started again."""
+        self._window, self.prover = window, window.prover
+        self._lost, self._readings, self.largest_at = False, None, None
+        self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)
+
+    # -- the set is too wide -------------------------------------------------------------------------
+
+    @property
+    def _horizon_of_gaps(self) -> int:
+        return self.horizon or _LONGEST
+
+    def _watch(self, sample: Sample, verdict: VerdictName) -> VerdictName:
+        """Look for readings that bound the state better than a set that a gap has blurred."""
+        if self._readings is None:
+            absent = np.isnan(sample.y)
+            if not (absent.any() or self._missing.any()):
+                return verdict
+            returned = ~absent & (self._missing >= self._horizon_of_gaps)
+            self._missing = np.where(absent, self._missing + 1, 0)
+            if not (returned.any() and self._is_blurred(returned, sample)):
+                return verdict
+            self._readings = self._new_readings()
+        self._readings.add(sample.u, sample.reading)
+        better = self._start_from_readings()
+        if better is None and self._readings is not None and self._readings.is_full:
+            self._readings = None
+        return better or verdict
+
+    def _is_blurred(self, returned: NDArray[np.bool_], sample: Sample) -> bool:
+        """Whether the slack of a sensor's row comes from the width of the set more than it should."""
+        own = sample.noise + self.eps * np.abs(np.nan_to_num(sample.y))
+        return bool((self._window.blur(sample.stack) > _BLURRED * own)[returned].any())
+
+    # -- the set is found ------------------------------------------------------------------------------
+
+    def _start_from_readings(self) -> VerdictName | None:
+        """Start again where the readings alone bound the state, if they do and it is the better set."""
+        assert self._readings is not None
+        found = self._readings.start()
+        if found is None:
+            return None
+        samples, lower, upper = found
+        physical = self._normal.physical_range
+        if physical is not None:
+            lower, upper, _ = physical.cut(lower, upper)
+        window = self._new_window(ArrivalSet.box(lower, upper), self._number - len(samples) + 1, free=True)
+        try:
+            verdict = _repeated(samples, window)
+        except Outgrown:
+            return None
+        if verdict != "falsified" and not self._is_better(window, verdict):
+            return None
+        self._adopt(window)
+        return verdict
+
+    def _is_better(self, window: Window, verdict: VerdictName) -> bool:
+        """Whether the set of a new window is nowhere wider than the one before."""
+        if verdict != "consistent" or self._lost:
+            return verdict == "consistent"
+        (lower, upper), (before, above) = self._newest_bounds(window), self._newest_bounds(self._window)
+        return bool((upper - lower <= above - before)[: self.model.n_states].all())
+
+
+def _repeated(samples: list[Reading], window: Window) -> VerdictName:
+    """Samples through a new window; the verdict is about the last one."""
+    verdict: VerdictName = "undecided"
+    for j, s in enumerate(samples):
+        window.proof = None  # by fewer readings than bound the first state: no proof
+        u = samples[j - 1].u if j else s.u
+        verdict = window.take(Sample(u, s.u, s.y, s.stack, s.noise, s.w_lower, s.w_upper, s.y))
+    return verdict

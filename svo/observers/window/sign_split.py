@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from svo.observers import window_kernel as kernel
 from svo.observers.certificate import Certificate
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import ArrivalSet, WindowSample
+from svo.observers.window.memory import Memory
 
 Cell = dict[tuple[int, int], tuple[float, float]]  # (sample, channel): bounds of its s
 _CHANGED = ("G", "GT", "row_x", "row_v", "row_c", "raw_lower", "raw_upper", "scale", "magnitude", "lower", "upper",
@@ -76,6 +76,10 @@ class SplitCertificate(Certificate):
         if self.s_lower.shape != shape or self.s_upper.shape != shape:
             return False
         return _cover(self.s_lower, self.s_upper, boxes)
+
+    def resting_on(self, largest_at: int | None) -> SplitCertificate:
+        """As `WindowCertificate.resting_on`, in every cell."""
+        return replace(self, cells=tuple(cell.resting_on(largest_at) for cell in self.cells))
 
     def premise(self, sample: int) -> str:
         return self.cells[0].premise(sample)
@@ -132,28 +136,20 @@ class SplitPrograms:
 
     Parameters
     ----------
-    arrays, window, size
-        Of the kernel.
+    memory : Memory
     certificate : callable
         The certificate of the window as it stands.
     limit : int
         Largest number of cells that a program may have.
     """
 
-    def __init__(
-        self,
-        arrays: dict[str, Any],
-        window: Any,
-        size: kernel.Sizes,
-        certificate: Callable[[], WindowCertificate],
-        limit: int,
-    ) -> None:
-        self._w, self._window, self._size, self._certificate, self._limit = arrays, window, size, certificate, limit
+    def __init__(self, memory: Memory, certificate: Callable[[], WindowCertificate], limit: int) -> None:
+        self._w, self._window, self._size = memory.arrays, memory.kernel, memory.size
+        self._certificate, self._limit = certificate, limit
         self._open = dict(self._open_channels())
-        self._saved = {name: arrays[name].copy() for name in _CHANGED}
-        base, time = int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME])
-        slots = [k % (size.N + size.late) for k in range(base, time + 1)]
-        self._bounds = arrays["s_lower"][slots].copy(), arrays["s_upper"][slots].copy()
+        self._saved = {name: self._w[name].copy() for name in _CHANGED}
+        slots = [k % (self._size.N + self._size.late) for k in range(memory.base, memory.time + 1)]
+        self._bounds = self._w["s_lower"][slots].copy(), self._w["s_upper"][slots].copy()
 
     @property
     def is_needed(self) -> bool:

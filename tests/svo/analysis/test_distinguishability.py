@@ -248,11 +248,11 @@ def test_an_uncertainty_of_rank_two_comes_apart_as_in_the_observer(seed: int) ->
     channels = pair.solve(1).observer.samples[0].channels
     window = WindowObserver(observer, start)
     window.update([0.0])
-    form = window._form
+    form, arrays = window._form, window._window.memory.arrays
     own = pair._forms[1].exponents
     rows, columns = form.exponents.rows - own.rows, form.exponents.columns - own.columns
     assert rows[3] != 0  # the outputs have other units than in the pair
     assert len(channels) == 3
     for q, channel in enumerate(channels):
-        np.testing.assert_array_equal(channel.gain, np.ldexp(window._arrays["gain"][0, q], rows))
-        np.testing.assert_array_equal(channel.functional, np.ldexp(window._arrays["functional"][0, q], -columns))
+        np.testing.assert_array_equal(channel.gain, np.ldexp(arrays["gain"][0, q], rows))
+        np.testing.assert_array_equal(channel.functional, np.ldexp(arrays["functional"][0, q], -columns))

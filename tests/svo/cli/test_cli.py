@@ -372,17 +372,18 @@ def test_the_chain_of_a_model_that_starts_late_is_proven_from_its_start(register
 
 
 def test_a_bound_that_is_not_proven_fails_the_chain(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from svo.observers.window.chain import ProvingObserver
+    from svo.observers.window.chain import BoundProver
+    from svo.observers.window.window import Window
 
-    honest = ProvingObserver._check_arrival
+    honest = BoundProver.arrival
 
-    def check_after_cheating(self: ProvingObserver, program: int, target: int) -> None:
+    def check_after_cheating(self: BoundProver, window: Window, program: int) -> None:
         if program == 0:
-            self._arrays["new_upper"][0] -= 1e-9
-        honest(self, program, target)
+            window.memory.arrays["new_upper"][0] -= 1e-9
+        honest(self, window, program)
 
     assert svo("detect", "tank", log, "--out", tmp_path).exit_code == 0
-    monkeypatch.setattr(ProvingObserver, "_check_arrival", check_after_cheating)
+    monkeypatch.setattr(BoundProver, "arrival", check_after_cheating)
     result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
     assert result.exit_code == 1
     reasons = [check["reason"] for check in json.loads(result.stdout)]

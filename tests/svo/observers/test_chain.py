@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from svo import LateMeasurement, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver, prove_chain
 from svo.logs.log import Log
+from svo.observers.window.window import Window
 from tests.svo.observers.random_plants import random_plant
 
 
@@ -47,19 +48,19 @@ def test_every_bound_of_many_plants_is_proven(seed: int) -> None:
 
 def test_a_bound_that_is_too_tight_is_not_proven(monkeypatch: pytest.MonkeyPatch) -> None:
     """Falsify the arrival sets by hand: the chain must notice, though every window proof still verifies."""
-    from svo.observers.window.chain import ProvingObserver
+    from svo.observers.window.chain import BoundProver
 
     model = UncertainModel([[0.9]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.1])
     rng = np.random.default_rng(0)
     log = model.simulate([0.2], np.zeros((30, 0)), rng)
-    honest = ProvingObserver._check_arrival
+    honest = BoundProver.arrival
 
-    def check_after_cheating(self: ProvingObserver, program: int, target: int) -> None:
+    def check_after_cheating(self: BoundProver, window: Window, program: int) -> None:
         if program == 0:
-            self._arrays["new_upper"][0] -= 1e-9
-        honest(self, program, target)
+            window.memory.arrays["new_upper"][0] -= 1e-9
+        honest(self, window, program)
 
-    monkeypatch.setattr(ProvingObserver, "_check_arrival", check_after_cheating)
+    monkeypatch.setattr(BoundProver, "arrival", check_after_cheating)
     chain = prove_chain(WindowObserver(model, HPolytope.box([-1.0], [1.0]), horizon=3), log)
     assert not chain.proven
     assert any("arrival bound 0" in what for what in chain.unproven)

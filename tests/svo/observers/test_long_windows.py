@@ -71,7 +71,7 @@ def test_the_rounding_of_the_state_is_within_its_bound_and_the_bound_is_small(
     observer = WindowObserver(model, HPolytope.box(-np.ones(n), np.ones(n)), horizon=horizon)
     for k in range(len(log)):
         _ = observer.update(log.y[k]) if k == 0 else observer.step(None, log.y[k])
-    w, size = observer._arrays, observer._size
+    w, size = observer._window.memory.arrays, observer._window.memory.size
     first, last = observer.window
     state = fmpq_mat(n, 1 + w["psi"].shape[1])  # constant, then z
     for i in range(n):
@@ -167,7 +167,7 @@ def test_no_room_for_a_longer_window_is_one_error_and_loses_nothing(monkeypatch:
 
     for k, y in enumerate(log.y):
         expected = other.update(y) if k == 0 else other.step(None, y)
-        if other._size.N > observer._size.N:
+        if other._window.memory.size.N > observer._window.memory.size.N:
             before = {name: value.tobytes() for name, value in observer.state_dict().items()}
             with monkeypatch.context() as scarce:
                 scarce.setattr("svo.observers.window_kernel.allocate", no_room)
@@ -178,4 +178,4 @@ def test_no_room_for_a_longer_window_is_one_error_and_loses_nothing(monkeypatch:
             assert before == {name: value.tobytes() for name, value in observer.state_dict().items()}
         step = observer.update(y) if k == 0 else observer.step(None, y)
         assert np.array_equal(step.box, expected.box)
-    assert observer._size.N == 32
+    assert observer._window.memory.size.N == 32

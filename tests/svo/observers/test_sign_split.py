@@ -106,6 +106,22 @@ def test_an_alarm_that_only_the_signs_give_is_proven_cell_by_cell() -> None:
         assert judge(cell) == "empty"
 
 
+def test_a_split_proof_states_that_it_rests_on_the_largest_set() -> None:
+    spread = Uncertainty(A=[[0.0, 0.0], [1.0, 0.0]], bounds=(-1.0, 1.0))
+    largest = ([-1.0, -1.0], [1.0, 1.0])
+    model = UncertainModel(
+        [[1.0, 0.0], [0.0, 0.0]], None, np.eye(2), n=[0.2, 0.01], uncertainties=[spread], largest=largest
+    )
+    observer = WindowObserver(model, HPolytope.box(*largest), horizon=4, sign_split=ENOUGH)
+    observer.lose_set()
+    observer.update([np.nan, np.nan])
+    observer.step(None, [np.nan, 0.9])
+    certificate = observer.step(None, [0.0, np.nan]).certificate
+    assert isinstance(certificate, SplitCertificate)
+    assert certificate.verify()
+    assert "the largest set at sample 5, where the set started again" in certificate.premise(7)
+
+
 def test_a_split_proof_needs_every_cell_and_the_same_data() -> None:
     certificate = split_alarm()
     for i in range(len(certificate.cells)):

@@ -24,7 +24,7 @@ def flown(rng: np.random.Generator, samples: int, **settings: object) -> WindowO
 
 
 def highs(observer: WindowObserver, cost: np.ndarray) -> float:
-    w = observer._arrays
+    w = observer._window.memory.arrays
     # Kept rows are up to 1e6 long: HiGHS, whose tolerances are absolute, misses their optimum by 3e-6, and once
     # they are shortened its presolve calls thin sets empty.
     lengths = np.maximum(np.abs(w["G"]).sum(axis=1), 1.0)
@@ -41,12 +41,12 @@ def highs(observer: WindowObserver, cost: np.ndarray) -> float:
 def test_supports_of_the_newest_state_are_optimal(seed: int) -> None:
     rng = np.random.default_rng(seed)
     observer = flown(rng, 14, horizon=int(rng.choice([1, 3, 5, 8, 10])))
-    w, n = observer._arrays, observer.model.n_states
-    at = int(w["clock"][kernel.TIME]) % (observer._size.N + 1)
+    w, n = observer._window.memory.arrays, observer.model.n_states
+    at = int(w["clock"][kernel.TIME]) % (observer._window.memory.size.N + 1)
     for direction in rng.normal(size=(3, n)):
         w["query"][:] = direction
         stops = int(w["clock"][kernel.STOPS])
-        observer._solve(kernel.QUERY)
+        observer._window.solve(kernel.QUERY)
         if w["clock"][kernel.STOPS] > stops:
             continue  # at the limit of pivots: an outer bound, not the optimum
         cost = direction @ w["psi"]
@@ -60,11 +60,12 @@ def test_supports_of_the_newest_state_are_optimal(seed: int) -> None:
 def test_a_program_that_is_stopped_early_is_wider_and_never_narrower(limit: int) -> None:
     rng = np.random.default_rng(7)
     observer = flown(rng, 14, horizon=5)
-    w = observer._arrays
+    memory = observer._window.memory
+    w = memory.arrays
     for direction in rng.normal(size=(5, observer.model.n_states)):
         w["query"][:] = direction
         answers = []
         for pivots in (limit, kernel.PIVOT_LIMIT):
-            kernel.solve(observer._window, observer._size, kernel.QUERY, 0, 1, pivots)
+            kernel.solve(memory.kernel, memory.size, kernel.QUERY, 0, 1, pivots)
             answers.append(float(w["answer"][0]))
         assert answers[1] <= answers[0] + 1e-12 * abs(answers[0])

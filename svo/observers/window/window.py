@@ -1,0 +1,389 @@
+"""A window: samples since a set of first states, and the programs that decide whether anything explains them.
+
+Observers drive it, and so do proofs from the first sample on: a window that has a `Prover` shows it every bound that it
+keeps. All in normal form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from svo.checks import Array
+from svo.models.normal_form import ENORMOUS
+from svo.observers import window_kernel as kernel
+from svo.observers.answers import VerdictName
+from svo.observers.given_units import window_out
+from svo.observers.readings import OUTSIDE
+from svo.observers.saved_state import take_exactly
+from svo.observers.window.certificate import WindowCertificate, certificate_of
+from svo.observers.window.evidence import ArrivalSet
+from svo.observers.window.fallback import candidates, is_feasible
+from svo.observers.window.memory import Memory, WindowSettings
+from svo.observers.window.sample import Outgrown, Sample, check_entry
+from svo.observers.window.sign_split import SplitCertificate, SplitPrograms
+
+_PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
+
+
+class Prover(Protocol):
+    """Checks the bounds of a window when they are made."""
+
+    def arrival(self, window: Window, program: int) -> None:
+        """The bound of the next arrival set that a program has just given."""
+        ...
+
+    def channel(self, window: Window, q: int, side: int, is_open: bool) -> None:
+        """The upper (0) or lower (1) bound of s of a channel of the newest sample, by its program if it is open."""
+        ...
+
+
+class Window:
+    """Samples in one block of memory, the programs over them, and the proof that nothing explains them.
+
+    Parameters
+    ----------
+    settings : WindowSettings
+    anchor : ArrivalSet
+        Contains the state at the first sample.
+    steps : int, optional
+        That the window has room for.
+    origin : int
+        Number that the observer gives to the first sample.
+    free : bool
+        Whether the anchor follows from the window's own readings.
+    prover : Prover, optional
+        Convex hulls are then kept, and programs solved one by one.
+
+    Attributes
+    ----------
+    memory : Memory
+    proof : WindowCertificate, SplitCertificate or None
+        That the window is empty, about the model and the data as given.
+    reason : str or None
+        Why the newest verdict is "undecided", where that is known.
+    """
+
+    def __init__(
+        self,
+        settings: WindowSettings,
+        anchor: ArrivalSet,
+        steps: int | None = None,
+        origin: int = 0,
+        free: bool = False,
+        prover: Prover | None = None,
+    ) -> None:
+        self.settings, self.anchor, self.origin, self.free, self.prover = settings, anchor, origin, free, prover
+        self._model, self._injection = settings.form.model, settings.injection
+        self.memory = Memory(settings, len(anchor.rows), settings.first_steps if steps is None else steps)
+        n, w = self._model.n_states, self.memory.arrays
+        w["h_lower"][:n], w["h_upper"][:n] = anchor.box_lower, anchor.box_upper
+        kernel.initialise(self.memory.kernel, self.memory.size, anchor.rows, anchor.lower, anchor.upper)
+        self.proof: WindowCertificate | SplitCertificate | None = None
+        self.reason: str | None = None
+        self._given: Array | None = None  # the newest reading
+        self._w_before: tuple[Array, Array] | None = None  # bounds of w at the newest sample
+
+    # -- samples -----------------------------------------------------------------------------------
+
+    @property
+    def oldest(self) -> int:
+        """Number of the first sample that is still there."""
+        return self.origin + self.memory.base
+
+    @property
+    def newest(self) -> int:
+        """Number of the newest sample; -1 before the first."""
+        return self.origin + self.memory.time if self.memory.started else -1
+
+    def take(self, sample: Sample, end: float | None = None) -> VerdictName:
+        """The next sample, by the time ``end`` if there is one; the window is unchanged if it raises ValueError.
+
+        Raises
+        ------
+        ValueError
+            For matrices that are not finite, or an uncertainty of a higher rank than at the typical schedule.
+        Outgrown
+            If the newest state has no bounds of use.
+        """
+        memory, self.reason = self.memory, None
+        if self.settings.horizon is None and memory.started and memory.time + 1 >= memory.size.N:
+            self._grow()
+        one_call = not self.settings.sign_split and self._injection is None
+        if one_call and end is None and self.prover is None:
+            code, found, program = kernel.take(*self._arguments(sample), self.settings.eps, kernel.PIVOT_LIMIT)
+            check_entry(code)
+            self._given = sample.given
+            if code == kernel.OUTGROWN:
+                raise Outgrown
+            verdict = "consistent" if found == kernel.CONSISTENT else self._conclude(kernel.ARRIVAL, found, program)
+        else:
+            self._enter(sample, end)
+            verdict = self._decide(end)
+        self._w_before = sample.w_lower, sample.w_upper
+        return self._cut_arrival(verdict)
+
+    def add_late(self, y: Array, sample: int) -> VerdictName:
+        """A measurement of a sample that is still there."""
+        own, memory, self.reason = sample - self.origin, self.memory, None
+        kernel.add_late(memory.kernel, memory.size, own, y, self.settings.eps)
+        if self._injection is not None:  # the sample was incomplete, so it is as it was given
+            s, w = own % (memory.size.N + 1), memory.arrays
+            w["given.y"][s], w["given.slack"][s] = w["y"][s], w["slack"][s]
+        return self._cut_arrival(self._decide(None))
+
+    def read_at(self, sample: int) -> Array:
+        """What was read at a sample that is still there."""
+        read: Array = self.memory.arrays["y"][(sample - self.origin) % (self.memory.size.N + 1)]
+        return read
+
+    def newest_bounds(self) -> tuple[Array, Array]:
+        """Bounds of the newest state along the axes, then the template."""
+        self.solve(kernel.NEWEST)
+        return self.memory.arrays["now_lower"].copy(), self.memory.arrays["now_upper"].copy()
+
+    def support(self, direction: Array) -> float:
+        """Upper bound of a direction of the newest state."""
+        self.memory.arrays["query"][:] = direction
+        self.solve(kernel.QUERY)
+        return float(self.memory.arrays["answer"][0])
+
+    def blur(self, stack: Array) -> Array:
+        """The slack of each row of the newest sample that comes from the width of the set."""
+        w, s, n = self.memory.arrays, self.memory.slot, self._model.n_states
+        width = w["mag"][s] - np.abs(w["phi"][s])
+        blur: Array = self.settings.eps * np.abs(stack[0, n:, :n]) @ np.maximum(width, 0.0)
+        return blur
+
+    # -- proofs --------------------------------------------------------------------------------------
+
+    def certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
+        """Of the multipliers at hand, about the model and the data as given.
+
+        ``objective`` is a sample of the window, as the kernel counts, and a direction, in normal form, whose bound is
+        to be proven.
+        """
+        w, size = self.memory.arrays, self.memory.size
+        if self._injection is not None:
+            found = self._injection.certificate(w, size, self._arrival(), objective)
+        else:
+            found = certificate_of(w, size, self._arrival())
+        found = replace(found, first=found.first + self.origin, last=found.last + self.origin)
+        out, beyond = window_out(found, self.settings.form), np.abs(found.samples[-1].y) == ENORMOUS
+        if self._given is None or not beyond.any():
+            return out
+        newest = replace(out.samples[-1], y=np.where(beyond, self._given, out.samples[-1].y))
+        return replace(out, samples=(*out.samples[:-1], newest))
+
+    def _arrival(self) -> ArrivalSet:
+        if self.memory.base == 0:
+            return self.anchor
+        n, w = self._model.n_states, self.memory.arrays
+        lower, upper = w["h_lower"].copy(), w["h_upper"].copy()
+        return ArrivalSet(lower[:n], upper[:n], self.settings.template, lower[n:], upper[n:])
+
+    def _prove(self) -> bool:
+        """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
+        self.proof = next((statement for statement in self._statements() if statement.verify()), None)
+        return self.proof is not None
+
+    def _statements(self) -> Iterator[WindowCertificate]:
+        """What the multipliers may prove: of a window that its readings alone began, first without any arrival set."""
+        certificate = self.certificate()
+        if self.free and self.memory.base == 0:
+            yield replace(certificate, arrival=ArrivalSet.unknown(self._model.n_states), on_arrival=np.zeros(0))
+        yield certificate
+
+    # -- saved states ----------------------------------------------------------------------------------
+
+    def state(self) -> dict[str, NDArray]:
+        """Everything but settings and prover, as named arrays."""
+        anchor = {f"anchor.{f.name}": getattr(self.anchor, f.name) for f in fields(ArrivalSet)}
+        before = dict(zip(("w_old_lower", "w_old_upper"), self._w_before or (), strict=False))
+        return anchor | before | self.memory.arrays
+
+    def resume(self, state: Mapping[str, NDArray], falsified: bool) -> None:
+        """Take back the memory that `state` gave; ValueError unless it is one, and its falsification proven again."""
+        take_exactly(self.memory.arrays, state)
+        if "w_old_lower" in state:
+            self._w_before = np.array(state["w_old_lower"]), np.array(state["w_old_upper"])
+        self.memory.check_clock()
+        if falsified:
+            if self.settings.sign_split:
+                self.solve(kernel.ARRIVAL)
+            self.proof = self.proof or next(self._statements())
+            if not self.proof.verify():
+                raise ValueError("its falsification cannot be proven again")
+
+    # -- what a sample comes to --------------------------------------------------------------------------
+
+    def _grow(self) -> None:
+        smaller = self.memory
+        self.memory = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N)
+        self.memory.copy_from(smaller)
+
+    def _arguments(self, sample: Sample) -> tuple[object, ...]:
+        """Those of the kernel, in one layout: it compiles anew for each that it meets."""
+        memory, w = self.memory, (sample.w_lower, sample.w_upper)
+        bounds: tuple[Array, ...] = (*(self._w_before or w), *w)
+        if self._injection is not None:
+            none = np.zeros(memory.size.nw - self._model.n_disturbances)
+            bounds = tuple(np.append(end, none) for end in bounds)
+        arrays = sample.u, sample.u_next, sample.y, sample.stack, sample.noise, *bounds
+        return memory.kernel, memory.size, not memory.started, *(np.array(a, order="C") for a in arrays)
+
+    def _enter(self, sample: Sample, end: float | None) -> None:
+        """One sample without its programs, but for those of its channels, which stop at the time ``end``."""
+        entered, injected = sample, False
+        if self._injection is not None:
+            w = sample.w_lower, sample.w_upper
+            stack, y, noise, injected = self._injection.transform(sample.stack, sample.y, w)
+            entered = sample._replace(stack=stack, y=y, noise=noise)
+        arguments, is_first = self._arguments(entered), not self.memory.started
+        code = kernel.enter(*arguments)
+        check_entry(code)
+        self._given = sample.given
+        self._settle_channels(code == kernel.SIGN_OPEN, False, is_first, end)
+        code = kernel.move(*arguments[:3])
+        arrays, s = self.memory.arrays, self.memory.slot
+        if self._injection is not None:
+            arrays["given.stack"][s], arrays["given.y"][s] = sample.stack, sample.y
+            arrays["given.injected"][s], arrays["given.slack"][s] = injected, 0.0
+        self._settle_channels(code == kernel.SIGN_OPEN, True, is_first, end)
+        if injected:
+            self._widen(sample)
+        if not kernel.complete(*arguments[:2], self.settings.eps):
+            raise Outgrown
+        if self._injection is not None and not injected:
+            arrays["given.slack"][s] = arrays["slack"][s]
+
+    def _widen(self, sample: Sample) -> None:
+        """Bounds of what the injection leaves to the state and to the box of w, by what is known of the state."""
+        assert self._injection is not None
+        w, s, v, nw = self.memory.arrays, self.memory.slot, self.memory.variables, self._model.n_disturbances
+        bounds = sample.w_lower, sample.w_upper
+        d, widening, slack = self._injection.widths(
+            sample.stack, sample.y, sample.u_next, w["mag"][s], bounds, self.settings.eps
+        )
+        w["w_lower"][v, nw:], w["w_upper"][v, nw:] = -d, d
+        w["noise"][s] += widening
+        w["given.slack"][s] = slack
+
+    def _settle_channels(self, sign_open: bool, reaching: bool, is_first: bool, end: float | None) -> None:
+        """Tighten the bounds of those s whose sign is open, of the channels that reach the output or of the others."""
+        w, v = self.memory.arrays, self.memory.variables
+        if not sign_open and (self.prover is None or (is_first and not reaching)):
+            return  # no transition leads to the first sample
+        gain = w["gain"][v][:, self._model.n_states :]
+        for q in np.flatnonzero(gain.any(axis=1) == reaching).tolist():
+            for side in range(2):
+                is_open = sign_open and w["s_lower"][v, q] < 0.0 < w["s_upper"][v, q]
+                if is_open:
+                    self._solve_one(kernel.CHANNELS, 2 * q + side, end)
+                if self.prover is not None:
+                    self.prover.channel(self, q, side, is_open)
+
+    def _cut_arrival(self, verdict: VerdictName) -> VerdictName:
+        """The next arrival set, once it is known, within the physical range."""
+        physical, w, n = self._model.physical_range, self.memory.arrays, self._model.n_states
+        if physical is None or not w["clock"][kernel.PENDING] or verdict == "falsified":
+            return verdict
+        w["new_lower"][:n], w["new_upper"][:n], meets = physical.cut(w["new_lower"][:n], w["new_upper"][:n])
+        if meets:
+            return verdict
+        self.reason = OUTSIDE  # not proven, so no alarm
+        return "undecided"
+
+    # -- programs ----------------------------------------------------------------------------------------
+
+    def solve(self, task: int) -> VerdictName:
+        """Solve the programs of a task; an empty window counts only once its certificate is proven."""
+        memory = self.memory
+        if self.settings.sign_split:
+            split = SplitPrograms(memory, self.certificate, self.settings.sign_split)
+            if split.is_needed:
+                return self._solve_split(split, task)
+        verdict, program = kernel.solve(memory.kernel, memory.size, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
+        return self._conclude(task, verdict, program)
+
+    def _decide(self, end: float | None) -> VerdictName:
+        """Whether anything explains the window, and the next arrival set."""
+        if end is None and self.prover is None:
+            return self.solve(kernel.ARRIVAL)
+        memory, decided = self.memory, False
+        is_full = memory.time - memory.base > memory.size.N - memory.size.block
+        for program in self._arrival_programs():
+            verdict = self._solve_one(kernel.ARRIVAL, program, end)
+            if verdict == kernel.EMPTY_CANDIDATE and self._prove():
+                return "falsified"
+            decided = decided or verdict == kernel.CONSISTENT
+            if self.prover is not None and is_full:
+                self.prover.arrival(self, program)
+        if end is None:
+            return "consistent" if decided else self._ask_highs()
+        if memory.time - memory.base == memory.size.N:
+            memory.arrays["clock"][kernel.PENDING] = 1
+        return "consistent" if decided else "undecided"
+
+    def _arrival_programs(self) -> range:
+        return range(*kernel.arrival_programs.py_func(self.memory.size, self.memory.base, self.memory.time))
+
+    def _conclude(self, task: int, verdict: int, program: int) -> VerdictName:
+        """What the programs of a task say; those after one that found the window empty have yet to be solved."""
+        memory = self.memory
+        while verdict == kernel.EMPTY_CANDIDATE:
+            if task == kernel.ARRIVAL and self._prove():
+                return "falsified"
+            after = program + 1
+            verdict, program = kernel.solve(memory.kernel, memory.size, task, after, kernel.ALL, kernel.PIVOT_LIMIT)
+        if verdict == kernel.CONSISTENT:
+            return "consistent"
+        return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
+
+    def _solve_one(self, task: int, program: int, end: float | None) -> int:
+        """One program, its pivots in portions until it is decided or the time ``end`` is reached, if there is one."""
+        memory, verdict, late, done = self.memory, kernel.UNDECIDED, False, 0
+        while verdict == kernel.UNDECIDED and not late:
+            portion = kernel.PIVOT_LIMIT
+            if end is None:
+                late = True
+            else:
+                late = perf_counter() >= end or done >= kernel.PIVOT_LIMIT
+                portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
+            verdict, _ = kernel.solve(memory.kernel, memory.size, task, program, program + 1, portion)
+            done += portion
+        return int(verdict)
+
+    def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
+        """As `solve`, each program over its cells."""
+        w, size = self.memory.arrays, self.memory.size
+        programs = {kernel.NEWEST: range(2 * size.nt), kernel.QUERY: range(1)}.get(task) or self._arrival_programs()
+        prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
+        has_point = False
+        for program in programs:
+            sign = 1.0 - 2.0 * (program % 2)
+            target = w["answer"] if prefix is None else w[f"{prefix}_{'lower' if program % 2 else 'upper'}"]
+            at = 0 if prefix is None else program // 2
+            result = split.solve(task, program, lambda t=target, i=at, s=sign: float(s * t[i]))  # type: ignore[misc]
+            has_point = has_point or result.has_point
+            if result.proof is None:
+                target[at] = sign * result.value
+            elif task == kernel.ARRIVAL and result.proof.verify():
+                self.proof = result.proof
+                return "falsified"
+        return "consistent" if has_point else "undecided"
+
+    def _ask_highs(self) -> VerdictName:
+        w = self.memory.arrays
+        feasible, ray = is_feasible(w["G"], w["lower"], w["upper"])
+        if feasible is False:
+            for multipliers in candidates(ray):
+                w["farkas"][:] = multipliers
+                if self._prove():
+                    return "falsified"
+        return "consistent" if feasible else "undecided"
