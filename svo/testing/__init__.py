@@ -1,10 +1,22 @@
-"""Conformance suites that a user's own plant is run through, as the project's own are.
+"""Conformance suites that a user's own observer or plant is run through, as the project's own are.
 
 Each rule has a name; the first that is broken is named in a `ConformanceError`, with what was seen and what to do.
 """
 
+from svo.testing.observer import OBSERVER_RULES, check_observer
+from svo.testing.observer_kind import Kind
 from svo.testing.plant import PLANT_RULES, check_plant
 from svo.testing.plant_runs import PlantRuns
 from svo.testing.rules import Conformance, ConformanceError, Rule
 
-__all__ = ["PLANT_RULES", "Conformance", "ConformanceError", "PlantRuns", "Rule", "check_plant"]
+__all__ = [
+    "OBSERVER_RULES",
+    "PLANT_RULES",
+    "Conformance",
+    "ConformanceError",
+    "Kind",
+    "PlantRuns",
+    "Rule",
+    "check_observer",
+    "check_plant",
+]

@@ -13,8 +13,8 @@ from svo.plant import HEALTHY, MonitoredPlant, schedule_of
 from svo.testing.plant_runs import SEED, PlantRuns, Scenario, around, cut, misfit, nominal_model
 from svo.testing.rules import Conformance, keep, rule, table
 
-LOOKED_AT = 200  # samples of a run that a bank is driven over
-AFTER_A_FAULT = 600  # samples that a fault's observer is driven over
+LOOKED_AT = 100  # samples of a run that a bank is driven over
+AFTER_A_FAULT = 400  # samples that a fault's observer is driven over
 PLAINLY_BETTER = 0.5  # times the misfit
 
 
@@ -38,8 +38,8 @@ def check_plant(plant: MonitoredPlant) -> Conformance:
 
     Notes
     -----
-    Seeds are fixed. Every fault and profile is simulated once, and its observer driven over the first 600 samples of
-    the fault; healthy runs of every noise set are looked at whole, the bank's answers over 200 samples.
+    Seeds are fixed. Every fault and profile is simulated once, and its observer driven over the first 400 samples of
+    the fault; healthy runs of every noise set are looked at whole, the bank's answers over 100 samples.
     """
     return keep(PLANT_RULES.values(), PlantRuns(plant))
 

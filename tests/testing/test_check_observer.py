@@ -1,0 +1,131 @@
+"""Observers that keep every rule pass, and each broken one is caught by its own rule."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from docs.examples.interval_observer import IntervalObserver
+from polytopes import HPolytope
+from svo import ConstrainedZonotopeObserver, PolytopeObserver, UncertainModel, WindowObserver
+from svo.testing import OBSERVER_RULES, ConformanceError, Kind, check_observer
+from tests.testing.broken.first_breach import broken_rules
+from tests.testing.broken.observers import BROKEN_OBSERVERS, AlarmWithoutProof
+
+ROOT = Path(__file__).parents[2]
+OWN = (WindowObserver, PolytopeObserver, ConstrainedZonotopeObserver)
+NOT_DECLARED = {"deadline", "late at its sample"}
+
+
+def long_window(model: UncertainModel, initial: HPolytope) -> WindowObserver:
+    return WindowObserver(model, initial, horizon=None)
+
+
+def short_slanted_window(model: UncertainModel, initial: HPolytope) -> WindowObserver:
+    return WindowObserver(model, initial, horizon=2, template=np.ones((1, model.n_states)))
+
+
+@pytest.mark.parametrize("make", [WindowObserver, long_window, short_slanted_window])
+def test_the_window_observer_keeps_every_rule(make: Any) -> None:
+    found = check_observer(make)
+    assert found.kept == tuple(OBSERVER_RULES)
+    assert not found.left_out
+
+
+@pytest.mark.parametrize("make", [PolytopeObserver, ConstrainedZonotopeObserver, IntervalObserver])
+def test_the_others_keep_every_rule_of_what_they_declare(make: Any) -> None:
+    found = check_observer(make)
+    assert set(found.kept) == set(OBSERVER_RULES) - NOT_DECLARED
+    assert set(found.left_out) == NOT_DECLARED
+
+
+# What cannot hold either once a rule is broken.
+FOLLOWS = {
+    "every possible state": {"healthy plant"},
+    "input of its sample": {"every possible state", "healthy plant", "saved state"},
+    "box": {"every possible state", "healthy plant"},
+    "runs apart": {"reset after falsification"},
+    "missing readings": {"undecided is an answer"},
+}
+
+
+@pytest.mark.parametrize("broken", BROKEN_OBSERVERS)
+def test_a_broken_observer_is_caught_by_its_own_rule(broken: Any) -> None:
+    own, found = BROKEN_OBSERVERS[broken], broken_rules(OBSERVER_RULES, Kind(broken))
+    assert found[0] == own
+    assert set(found) <= {own} | FOLLOWS.get(own, set())
+
+
+def test_the_error_says_which_rule_what_was_seen_and_what_to_do() -> None:
+    with pytest.raises(ConformanceError) as caught:
+        check_observer(AlarmWithoutProof)
+    error = caught.value
+    assert isinstance(error, AssertionError)
+    assert (error.rule, error.found) == ("alarm with proof", "falsified at sample 4 without a certificate")
+    assert all(part in str(error) for part in (error.rule, error.found, error.says, error.advice))
+
+
+class Shrunk:
+    """An observer of which one part of each answer is smaller by 1e-9 of its width."""
+
+    def __init__(self, observer: Any, part: str) -> None:
+        self._observer, self._part, self.model = observer, part, observer.model
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._observer, name)
+
+    def update(self, *given: Any, **named: Any) -> Any:
+        return shrunk(self._observer.update(*given, **named), self._part)
+
+    def step(self, *given: Any, **named: Any) -> Any:
+        return shrunk(self._observer.step(*given, **named), self._part)
+
+
+def shrunk(step: Any, part: str) -> Any:
+    shown = {name: getattr(step, name) for name in ("verdict", "certificate", "box", "set")}
+    shown["support"] = step.support
+    if step.verdict == "consistent" and part == "box":
+        lower, upper = step.box
+        shown["box"] = lower + 1e-9 * (upper - lower), upper - 1e-9 * (upper - lower)
+    if step.verdict == "consistent" and part == "support":
+        shown["support"] = lambda d: step.support(d) - 1e-9 * (step.support(d) + step.support(-np.asarray(d)))
+    if step.verdict == "consistent" and part == "set":
+        widths = step.support(step.set.A) + step.support(-step.set.A)
+        shown["set"] = HPolytope(step.set.A, step.set.b - 1e-9 * widths)
+    return SimpleNamespace(**shown)
+
+
+@pytest.mark.parametrize("make", [*OWN, long_window, short_slanted_window])
+@pytest.mark.parametrize("part", ["box", "support", "set"])
+def test_a_part_of_an_answer_that_is_short_by_1e_9_of_its_width_is_seen(make: Any, part: str) -> None:
+    rule = OBSERVER_RULES["every possible state"]
+    with pytest.raises(ConformanceError, match=f"{part} in direction"):
+        rule.check(Kind(lambda model, initial: Shrunk(make(model, initial), part)))
+
+
+def test_a_kind_that_refuses_models_is_asked_about_the_others() -> None:
+    def without_uncertainties(model: UncertainModel, initial: HPolytope) -> IntervalObserver:
+        if model.uncertainties or model.is_scheduled:
+            raise NotImplementedError("constant and certain matrices only")
+        return IntervalObserver(model, initial)
+
+    found = check_observer(without_uncertainties)
+    assert found.left_out["models with an uncertain pole"] == "constant and certain matrices only"
+
+
+def test_a_kind_that_takes_no_model_at_all_breaks_a_rule() -> None:
+    def refuses(model: UncertainModel, initial: HPolytope) -> Any:
+        raise NotImplementedError("later")
+
+    with pytest.raises(ConformanceError, match="NotImplementedError: later"):
+        check_observer(refuses)
+
+
+def test_the_page_lists_every_rule() -> None:
+    page = (ROOT / "docs" / "write_an_observer.md").read_text(encoding="utf-8")
+    rows = [f"| {rule.name} | {rule.says} | {rule.advice} |" for rule in OBSERVER_RULES.values()]
+    assert "\n".join(rows) in page
