@@ -22,7 +22,7 @@ from svo.isolation.bank import Bank
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
 from svo.observers.window.observer import WindowObserver
-from svo.plant import HEALTHY, Column, Columns, Distribution, Exhibit, Reference, StatedFault
+from svo.plant import HEALTHY, AddedStudy, Column, Columns, Distribution, Exhibit, Reference, StatedFault
 
 if TYPE_CHECKING:
     from svo.detectors.detector import Detector
@@ -166,13 +166,16 @@ class Missile:
         stated = {name: fault.model for name, fault in self.stated_faults(noise, shared=False).items()}
         return detectors(self.models(noise), nominal, stated, INITIAL, self.flights.airframe)
 
-    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> list[Exhibit]:
-        """The residuals' part of a study: scenarios of Table II over seeds, written into its folder."""
-        from aircraft.missile.figures import write_figures
-        from aircraft.missile.scenario_study import run_study
+    def added_study(self, runs: int, seed: int, noise: Sequence[str]) -> AddedStudy:
+        """The residuals' part of a study: scenarios of Table II over seeds."""
+        from aircraft.missile.scenario_study import scenario_study
 
-        study = run_study(runs, seed, noise, self.flights, folder / "scenarios")
-        study.write(folder)
+        return scenario_study(runs, seed, noise, self.flights)
+
+    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> list[Exhibit]:
+        """Trajectories and residuals of the scenarios of Table II."""
+        from aircraft.missile.figures import write_figures
+
         caption = (
             "A flight with the seed of the study; dashed lines: a fault begins. Tables: scenarios.txt, scenario_*.csv."
         )

@@ -1,19 +1,18 @@
 """The scenarios of Table II over many seeds: delays of the residuals, false alarms, isolation by order in time.
 
-Run ``python -m aircraft.missile.scenario_study --runs 100 --out DIR``; ``svo study missile`` includes it. Delays are
-counted from the first faulty sample, which itself counts as one sampling time, to the RECEPTION of the measurement
-that gives the alarm: the two samples of the IMU's delay are in them.
+``svo study missile`` includes it. Delays are counted from the first faulty sample, which itself counts as one sampling
+time, to the RECEPTION of the measurement that gives the alarm: the two samples of the IMU's delay are in them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Any
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from aircraft.missile.adaptive import ModelError
@@ -24,9 +23,8 @@ from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scen
 from aircraft.missile.sequence import isolate_in_order
 from svo.checks import Array
 from svo.indices import first_true, judge_alarm
-from svo.store import Identity, Parts, versions, write_csv, write_text
-from svo.store import locked as alone_in
-from svo.store.tables import Json
+from svo.plant import AddedStudy
+from svo.store import write_csv, write_text
 
 Flags = NDArray[np.bool_]
 
@@ -95,11 +93,32 @@ class OrderRow:
 
 
 @dataclass(frozen=True)
+class FlownCases:
+    """A job of the study, and its row: one flight of every case with one noise set; rows as plain data.
+
+    ``seed`` is the place of the flight among those of the study.
+    """
+
+    noise: str
+    seed: int
+    residuals: tuple[dict[str, Any], ...] = ()
+    orders: tuple[dict[str, Any], ...] = ()
+    error: str | None = None
+
+
+@dataclass(frozen=True)
 class ScenarioStudy:
     """All rows of a study."""
 
     residuals: tuple[ResidualRow, ...]
     orders: tuple[OrderRow, ...]
+
+    @classmethod
+    def of(cls, flown: Sequence[FlownCases]) -> ScenarioStudy:
+        return cls(
+            tuple(ResidualRow(**row) for cases in flown for row in cases.residuals),
+            tuple(OrderRow(**row) for cases in flown for row in cases.orders),
+        )
 
     def to_text(self) -> str:
         """Tables for people."""
@@ -112,40 +131,36 @@ class ScenarioStudy:
         write_text(folder / "scenarios.txt", self.to_text() + "\n")
 
 
-def run_study(
-    runs: int, seed: int, noises: Sequence[str], flights: Flights | None = None, keep: Path | None = None
-) -> ScenarioStudy:
-    """Fly every scenario, every magnitude, and without a fault, ``runs`` times with each noise set.
-
-    Rows that stand in the folder ``keep`` are not computed again; it is made if need be.
+def scenario_study(runs: int, seed: int, noises: Sequence[str], flights: Flights | None = None) -> AddedStudy:
+    """The study of every scenario, every magnitude, and without a fault: ``runs`` flights of each with each noise set.
 
     Raises
     ------
     ValueError
-        If ``runs`` is below one, a noise set is not known, or another process is at work in ``keep``.
+        If ``runs`` is below one, or a noise set is not known.
     """
     if runs < 1:
         raise ValueError(f"runs is {runs}; expected at least 1")
+    for noise in noises:
+        noise_set(noise)
     simulator = Flights() if flights is None else flights
-    tasks = [(noise, i, c) for noise in noises for i, c in enumerate(np.random.SeedSequence(seed).spawn(runs))]
-    if keep is None:
-        return _joined([_fly(simulator, *task) for task in tasks])
     configuration = {"runs": runs, "seed": seed, "noises": list(noises), "model_error": simulator.model_error}
-    study = Identity("missile-scenarios-1", configuration, versions()).digest
-    keep.mkdir(parents=True, exist_ok=True)
-    residual_parts = Parts(keep / "residuals", ResidualRow, study, Json())
-    order_parts = Parts(keep / "orders", OrderRow, study, Json())
-    with alone_in(keep):
-        residual_parts.make()
-        order_parts.make()
-        done = residual_parts.survey().intact.keys() & order_parts.survey().intact.keys()
-        for number, task in enumerate(tasks):
-            if number not in done:
-                flown = _fly(simulator, *task)
-                residual_parts.write(number, flown.residuals)
-                order_parts.write(number, flown.orders)
-    numbers = range(len(tasks))
-    return ScenarioStudy(tuple(residual_parts.rows(numbers)), tuple(order_parts.rows(numbers)))
+    jobs = [FlownCases(noise, i) for noise in noises for i in range(runs)]
+    return AddedStudy(
+        "scenarios",
+        configuration,
+        jobs,
+        work=partial(_fly, simulator, seed),
+        row=FlownCases,
+        failed=lambda job, error: replace(job, error=error),
+        write=lambda folder, rows: ScenarioStudy.of(rows).write(folder),
+    )
+
+
+def run_study(runs: int, seed: int, noises: Sequence[str], flights: Flights | None = None) -> ScenarioStudy:
+    """Fly that study here and now; errors as of `scenario_study`."""
+    study = scenario_study(runs, seed, noises, flights)
+    return ScenarioStudy.of([study.work(job) for job in study.jobs])
 
 
 def fixed_alarms(time: Array, values: Array) -> Flags:
@@ -171,22 +186,17 @@ def signature_text(simulator: Flights) -> str:
     return "\n".join(lines) + "\n\n" + isolability_table(signature, TABLE_1).to_text()
 
 
-def _fly(simulator: Flights, noise: str, seed: int, child: np.random.SeedSequence) -> ScenarioStudy:
-    """One flight of every case."""
+def _fly(simulator: Flights, study_seed: int, job: FlownCases) -> FlownCases:
+    """One flight of every case, all with the same errors."""
+    child = np.random.SeedSequence(study_seed, spawn_key=(job.seed,))
     cases = {HEALTHY: Scenario((), TABLE_1)} | {f"scenario {i}": s for i, s in SCENARIOS.items()} | MAGNITUDES
     rows: list[ResidualRow] = []
     orders: list[OrderRow] = []
     for name, scenario in cases.items():
-        run = simulator.run(scenario.faults, noise_set(noise), child)
-        rows += _residual_rows(simulator, run, scenario, name, noise, seed)
-        orders.append(_order_row(simulator, run, scenario, name, noise, seed))
-    return ScenarioStudy(tuple(rows), tuple(orders))
-
-
-def _joined(flown: Sequence[ScenarioStudy]) -> ScenarioStudy:
-    return ScenarioStudy(
-        tuple(row for part in flown for row in part.residuals), tuple(row for part in flown for row in part.orders)
-    )
+        run = simulator.run(scenario.faults, noise_set(job.noise), child)
+        rows += _residual_rows(simulator, run, scenario, name, job.noise, job.seed)
+        orders.append(_order_row(simulator, run, scenario, name, job.noise, job.seed))
+    return replace(job, residuals=tuple(map(asdict, rows)), orders=tuple(map(asdict, orders)))
 
 
 def _residual_rows(
@@ -280,28 +290,3 @@ def _order_text(rows: Sequence[OrderRow]) -> str:
     missed = sum(not row.sizes_contain_truth for row in rows)
     lines.append(f"wrong orders: {wrong}/{len(rows)}; bounds of a size that miss the truth: {missed}/{len(rows)}")
     return "\n".join(lines)
-
-
-def main(
-    out: Annotated[Path, typer.Option(help="Folder of tables and pictures.")],
-    runs: Annotated[int, typer.Option(min=1, help="Flights of each case and noise set.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Seed that all flights' seeds are spawned from.")] = 0,
-    model_error: Annotated[float, typer.Option(help="Largest relative error of the force coefficients.")] = 0.0,
-) -> None:
-    """Fly the missile's scenarios over many seeds; write tables and pictures, and print the tables.
-
-    Flights that stand in OUT/scenarios, of the same study with the same software, are not flown again.
-    """
-    from aircraft.missile.figures import write_figures
-    from aircraft.missile.imu import NOISE_SETS
-
-    out.mkdir(parents=True, exist_ok=True)
-    flights = Flights(model_error=model_error)
-    study = run_study(runs, seed, tuple(NOISE_SETS), flights, out / "scenarios")
-    study.write(out)
-    write_figures(out, flights, seed)
-    typer.echo(study.to_text())
-
-
-if __name__ == "__main__":
-    typer.run(main)

@@ -109,7 +109,7 @@ def study(
         from svo.studies.configuration import StudyConfiguration
         from svo.studies.isolation.runner import run_study
         from svo.studies.isolation.store import StudyFolder
-        from svo.studies.runs import failures
+        from svo.studies.runs import all_failures
         from svo.studies.thresholds import LearnsDetectors, run_detection_study
 
         the_plant = plant_to_simulate(plant)
@@ -137,7 +137,7 @@ def study(
         shown(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
         if not as_json:
             typer.echo(f"Report: {out / 'report.html'}")
-        failed = failures(folder.rows())
+        failed = all_failures(folder, the_plant)
     tell_failures(failed, "runs")
 
 

@@ -9,8 +9,7 @@ from typing import Any
 from svo.logs.names import Column, Columns
 from svo.plant.protocol import (
     HEALTHY,
-    AddsExhibits,
-    ComparesDetectors,
+    AddedStudy,
     Distribution,
     Exhibit,
     MonitoredPlant,
@@ -37,6 +36,7 @@ from svo.plant.scheduling import (
 
 __all__ = [
     "HEALTHY",
+    "AddedStudy",
     "AddsExhibits",
     "Column",
     "Columns",
@@ -69,6 +69,8 @@ __all__ = [
 
 # Capabilities that a plant may have are declared beside what asks for them; their names are still found here.
 _BESIDE_THEIR_USE = {
+    "AddsExhibits": "svo.studies.added",
+    "ComparesDetectors": "svo.studies.comparison.offer",
     "DetectsThresholds": "svo.detection.thresholds",
     "LimitsInputs": "svo.analysis.plant_input",
     "StatesFaults": "svo.analysis.isolability",

@@ -7,10 +7,10 @@ points of its distribution.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,6 @@ from svo.logs.log import Log
 from svo.logs.names import Columns
 from svo.models.model import UncertainModel
 from svo.plant.scheduling import Scheduler
-
-if TYPE_CHECKING:
-    from svo.detectors.detector import Detector
 
 HEALTHY = "none"
 Distribution = Literal["bounded", "gaussian"]
@@ -212,16 +209,35 @@ class Exhibit:
     caption: str
 
 
-@runtime_checkable
-class AddsExhibits(Protocol):
-    """What a `Plant` offers besides if its study has more to show than the bank's times to detect and isolate."""
+@dataclass(frozen=True)
+class AddedStudy:
+    """A study that a plant adds to that of its bank: jobs for the engine of all studies.
 
-    def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
-        """Run the additional part of a study, write tables and pictures into its folder, return the pictures.
+    Attributes
+    ----------
+    name : str
+        Of its folder in the study's.
+    configuration : mapping
+        What its rows depend on besides the versions of the software; plain data.
+    jobs : sequence
+        Can be pickled.
+    work : function of a job
+        Its row; can be pickled.
+    row : type
+        The dataclass of rows; its ``error`` says why a job failed, and is None otherwise.
+    failed : function of a job and an error
+        The row of a job that failed.
+    write : function of a folder and rows
+        Writes tables of the rows that did not fail into the study's folder.
+    """
 
-        ``runs``, ``seed`` and the noise sets ``noise`` are those of the study.
-        """
-        ...
+    name: str
+    configuration: Mapping[str, Any]
+    jobs: Sequence[Any]
+    work: Callable[[Any], Any]
+    row: type[Any]
+    failed: Callable[[Any, str], Any]
+    write: Callable[[Path, Sequence[Any]], None]
 
 
 @runtime_checkable
@@ -248,27 +264,3 @@ def first_faulty_sample(plant: Plant, fault: str, profile: str, time: NDArray[np
     if fault == HEALTHY:
         return len(time)
     return round((fault_start(plant, fault, profile) - float(time[0])) / plant.Ts)
-
-
-@runtime_checkable
-class ComparesDetectors(Protocol):
-    """What a `Plant` offers besides if ``svo compare`` can set detectors side by side on it.
-
-    Attributes
-    ----------
-    compared_faults : tuple of (fault, profile)
-        The scenarios of the comparison.
-    """
-
-    compared_faults: tuple[tuple[str, str], ...]
-
-    def with_noise(self, distribution: Distribution) -> Plant:
-        """This plant with its noise drawn from a ``distribution``; models and bounds stay as they are.
-
-        "bounded" is within the bounds of the noise set, "gaussian" of the same rms and unbounded.
-        """
-        ...
-
-    def detectors(self, noise: str) -> Sequence[Detector]:
-        """The detectors to compare with one noise set; their names differ."""
-        ...

@@ -118,5 +118,10 @@ def complete_parts(
     return parts.rows(range(len(jobs)))
 
 
+def within(progress: Progress | None, total: int, before: int) -> Progress:
+    """The progress of jobs that are part of ``total``, ``before`` of which come first."""
+    return lambda done, _: progress(before + done, total) if progress else None
+
+
 def _without_number(work: Callable[[Job], Outcome], numbered: tuple[int, Job]) -> Outcome:
     return work(numbered[1])

@@ -7,8 +7,9 @@ from functools import cache, partial
 from typing import Any, Protocol, TypeVar
 
 from svo.plant import Plant, load_plant
+from svo.studies.added import added_failures, added_study, run_added
 from svo.studies.configuration import Job, StudyConfiguration
-from svo.studies.engine import Place, Progress, complete
+from svo.studies.engine import Place, Progress, complete, within
 from svo.studies.store import StudyStore
 
 
@@ -49,14 +50,18 @@ def run_into(
     progress: Progress | None = None,
 ) -> None:
     """Run what is still to be run of a study and store it, run by run; ``work`` takes the plant's name and a job."""
-    jobs = configuration.jobs(registered_plant(configuration.plant))
+    plant = registered_plant(configuration.plant)
+    jobs, added = configuration.jobs(plant), added_study(plant, configuration)
+    told = partial(within, progress, len(jobs) + (len(added.jobs) if added else 0))
     with folder.open(configuration, len(jobs), resume=resume, retry_failed=retry_failed) as done:
 
         def keep(number: int, outcome: Any) -> None:
             folder.keep(configuration, jobs[number], outcome)
 
-        complete(partial(work, configuration.plant), jobs, done, keep, place, progress)
+        complete(partial(work, configuration.plant), jobs, done, keep, place, told(0))
         folder.join_alarms()
+        if added:
+            run_added(added, folder.path, place, retry_failed=retry_failed, progress=told(len(jobs)))
 
 
 def failures(rows: Sequence[Identified]) -> list[str]:
@@ -67,6 +72,12 @@ def failures(rows: Sequence[Identified]) -> list[str]:
         for row in rows
         if row.error is not None
     ]
+
+
+def all_failures(folder: StudyStore[Any], plant: Plant) -> list[str]:
+    """Those of a study and of what its plant adds to it."""
+    added = added_study(plant, StudyConfiguration.from_dict(folder.identity()["configuration"]))
+    return failures(folder.rows()) + (added_failures(added, folder.path) if added else [])
 
 
 def finished_runs(rows: Sequence[AnyRow]) -> list[AnyRow]:

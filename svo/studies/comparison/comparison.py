@@ -12,12 +12,13 @@ import numpy as np
 
 from svo.detectors.detector import Detector, Kind, Setting
 from svo.logs.log import Log
-from svo.plant import HEALTHY, ComparesDetectors, Distribution, Plant, fault_start, first_faulty_sample, load_plant
+from svo.plant import HEALTHY, Distribution, Plant, fault_start, first_faulty_sample, load_plant
 from svo.studies.attempt import Failed, attempt
+from svo.studies.comparison.offer import ComparesDetectors
 from svo.studies.comparison.run import ComparedRun, Condition, compare_run
 from svo.studies.comparison.store import TunedRow, comparison_parts
 from svo.studies.comparison.tuning import FaultyRun, Tuned, tune
-from svo.studies.engine import Place, Progress, complete_parts
+from svo.studies.engine import Place, Progress, complete_parts, within
 
 DISTRIBUTIONS: tuple[Distribution, ...] = ("bounded", "gaussian")
 _TRAINING, _JUDGING, _CALIBRATION = 0, 1, 2  # branches of the seed
@@ -31,7 +32,7 @@ class Comparison:
     Parameters
     ----------
     plant : str
-        A registered plant that is a `svo.plant.ComparesDetectors`.
+        A registered plant that is a `svo.studies.comparison.offer.ComparesDetectors`.
     noise : str
         Its noise set.
     runs : int
@@ -170,9 +171,7 @@ def run_comparison(
     tunings = [(distribution, index) for distribution in comparison.distributions for index in range(len(names))]
     parts = list(comparison.parts())
 
-    def told(before: int) -> Progress:
-        return lambda done, _: progress(before + done, len(tunings) + len(parts)) if progress else None
-
+    told = functools.partial(within, progress, len(tunings) + len(parts))
     with comparison_parts(None if out is None else Path(out), comparison.to_dict(), resume) as keep:
         do = functools.partial(complete_parts, place=place, retry_failed=retry_failed)
         tune_one = functools.partial(_tuned_rows, comparison)
@@ -197,7 +196,7 @@ def compared_plant(name: str) -> ComparesDetectors:
     """The registered plant, which offers a comparison; loaded once a process."""
     plant = load_plant(name)
     if not isinstance(plant, ComparesDetectors):
-        raise TypeError(f"plant {name!r} offers no detectors to compare; it is no svo.plant.ComparesDetectors")
+        raise TypeError(f"plant {name!r} offers no detectors to compare; it lacks members of ComparesDetectors")
     return plant
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from svo.plant import AddsExhibits, Plant
+from svo.plant import Plant
+from svo.studies.added import AddsExhibits, added_failures, added_study, publish_added
+from svo.studies.configuration import StudyConfiguration
 from svo.studies.isolation.figures import Picture, write_pictures
 from svo.studies.isolation.interactive import interactive_section
 from svo.studies.isolation.report import write_report
@@ -23,13 +25,14 @@ def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) ->
     rows, exemplars = finished_runs(every), folder.exemplars(without_damaged)
     summaries = summarise(rows)
     write_summary(folder.path / "summary.csv", summaries)
-    pictures = write_pictures(folder.path, plant, summaries, exemplars)
+    pictures, failed = write_pictures(folder.path, plant, summaries, exemplars), failures(every)
+    asked = StudyConfiguration.from_dict(folder.identity()["configuration"])
+    if added := added_study(plant, asked):
+        publish_added(added, folder.path)
+        failed += added_failures(added, folder.path)
     if isinstance(plant, AddsExhibits):
-        asked = folder.identity()["configuration"]
-        added = plant.exhibits(folder.path, asked["runs"], asked["seed"], asked["noise"])
-        pictures += [Picture(exhibit.path, exhibit.title, exhibit.caption) for exhibit in added]
+        shown = plant.exhibits(folder.path, asked.runs, asked.seed, asked.noise)
+        pictures += [Picture(exhibit.path, exhibit.title, exhibit.caption) for exhibit in shown]
     interactive = interactive_section(plant, rows, exemplars)
-    write_report(
-        folder.path / "report.html", plant, folder.identity(), summaries, pictures, interactive, failures(every)
-    )
+    write_report(folder.path / "report.html", plant, folder.identity(), summaries, pictures, interactive, failed)
     return summaries

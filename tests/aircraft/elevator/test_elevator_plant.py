@@ -11,7 +11,8 @@ from aircraft.elevator.plant import POLES, TABLE_1, elevator
 from svo import WindowObserver
 from svo.detectors.detector import Detector, Setting
 from svo.logs.drive import drive
-from svo.plant import ComparesDetectors, InputScheduler, Plant, TimesFaults, fault_start, load_plant, schedule_of
+from svo.plant import InputScheduler, Plant, TimesFaults, fault_start, load_plant, schedule_of
+from svo.studies.comparison.offer import ComparesDetectors
 from svo.studies.thresholds import LearnsDetectors
 
 PLANT = elevator()

@@ -6,7 +6,7 @@ import pytest
 from aircraft.missile.detectors import Redundancy
 from aircraft.missile.plant import missile
 from svo.detectors.detector import Detector, Setting
-from svo.plant import ComparesDetectors
+from svo.studies.comparison.offer import ComparesDetectors
 
 PLANT = missile()
 LOGS = {

@@ -12,7 +12,8 @@ from aircraft.missile.models import OUTPUTS, Embedding, read_bounds
 from aircraft.missile.plant import ENDS, FAULTS, Missile, fault_of, missile
 from aircraft.missile.scenarios import TS, Flights
 from svo.logs.drive import drive
-from svo.plant import AddsExhibits, Plant, load_plant
+from svo.plant import Plant, load_plant
+from svo.studies.added import AddsExhibits, AddsStudy
 
 PLANT = missile()
 
@@ -21,6 +22,7 @@ def test_it_is_registered_and_keeps_the_protocol() -> None:
     plant = load_plant("missile")
     assert isinstance(plant, Plant)
     assert isinstance(plant, AddsExhibits)
+    assert isinstance(plant, AddsStudy)
     assert set(read_bounds()) == set(plant.noise_sets)
     assert all(set(b) == {"nominal", *FAULTS} for b in read_bounds().values())
 

@@ -1,13 +1,26 @@
 """The study of the scenarios: delays within the orders of the specification, reproducible, readable."""
 
+import pickle
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aircraft.missile.figures import write_figures
-from aircraft.missile.scenario_study import MEAN_SAMPLES, ScenarioStudy, fixed_alarms, run_study
+from aircraft.missile.scenario_study import (
+    MEAN_SAMPLES,
+    FlownCases,
+    OrderRow,
+    ResidualRow,
+    ScenarioStudy,
+    fixed_alarms,
+    run_study,
+    scenario_study,
+)
 from aircraft.missile.scenarios import Flights
+from svo.studies.added import added_failures, publish_added, run_added
+from svo.studies.engine import Place
 
 
 @pytest.fixture(scope="module")
@@ -79,21 +92,44 @@ def test_pictures_are_written(tmp_path: Path) -> None:
     assert all(path.stat().st_size > 10_000 for path in written.values())
 
 
-def test_flights_that_are_kept_are_not_flown_again(
-    study: ScenarioStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    flown = []
+def test_flights_that_are_kept_are_not_flown_again(study: ScenarioStudy, tmp_path: Path) -> None:
+    calls: list[tuple[int, int]] = []
 
-    def fly(simulator: Flights, noise: str, seed: int, child: np.random.SeedSequence) -> ScenarioStudy:
-        flown.append(seed)
-        return ScenarioStudy(*(tuple(r for r in rows if r.seed == seed) for rows in (study.residuals, study.orders)))
+    def fly(seed: int) -> None:
+        added = scenario_study(2, seed, ("gaussian",))
+        run_added(added, tmp_path, Place(), progress=lambda *done: calls.append(done))
+        publish_added(added, tmp_path)
+        assert added_failures(added, tmp_path) == []
 
-    monkeypatch.setattr("aircraft.missile.scenario_study._fly", fly)
-    assert run_study(2, 0, ("gaussian",), keep=tmp_path) == study
-    assert flown == [0, 1]
-    part = tmp_path / "orders" / "run-000001.jsonl"
+    fly(0)
+    assert calls == [(0, 2), (1, 2), (2, 2)]
+    text = (tmp_path / "scenarios.txt").read_text(encoding="utf-8")
+    assert text == study.to_text() + "\n"
+    part = tmp_path / "scenarios" / "rows" / "run-000001.jsonl"
     part.write_bytes(part.read_bytes()[:-1])
-    assert run_study(2, 0, ("gaussian",), keep=tmp_path) == study
-    assert flown == [0, 1, 1]
-    run_study(2, 1, ("gaussian",), keep=tmp_path)  # another study: nothing of this one counts
-    assert flown == [0, 1, 1, 0, 1]
+    fly(0)
+    assert calls[3:] == [(1, 2), (2, 2)]
+    assert (tmp_path / "scenarios.txt").read_text(encoding="utf-8") == text
+
+
+def test_a_flight_that_fails_is_a_row_and_named(tmp_path: Path) -> None:
+    added = replace(scenario_study(2, 0, ("gaussian",)), work=fail_in_the_second)
+    run_added(added, tmp_path, Place())
+    assert added_failures(added, tmp_path) == ["run 1 of scenarios failed: ArithmeticError: a wing came off"]
+    publish_added(added, tmp_path)
+    assert (tmp_path / "scenario_orders.csv").read_text(encoding="utf-8").count("\n") == 2
+
+
+def fail_in_the_second(job: FlownCases) -> FlownCases:
+    if job.seed == 1:
+        raise ArithmeticError("a wing came off")
+    order = OrderRow("healthy", job.noise, job.seed, "", "", False, "", True)
+    residual = ResidualRow("healthy", job.noise, job.seed, "r14", "fixed", None, None, 0, 0)
+    return replace(job, residuals=(asdict(residual),), orders=(asdict(order),))
+
+
+def test_the_study_can_be_sent_to_a_worker() -> None:
+    added = scenario_study(1, 0, ("bounded",))
+    work, jobs = pickle.loads(pickle.dumps((added.work, added.jobs)))
+    assert jobs == added.jobs
+    assert callable(work)
