@@ -28,7 +28,7 @@ class AddsExhibits(Protocol):
     """What a `Plant` offers besides if its study has more to show than the pictures of its bank."""
 
     def exhibits(self, folder: Path, runs: int, seed: int, noise: Sequence[str]) -> Sequence[Exhibit]:
-        """Write pictures into the ``folder`` of a study with ``runs``, ``seed`` and noise sets ``noise``; return them."""
+        """Write pictures into the ``folder`` of a study of ``runs``, ``seed`` and noise sets ``noise``."""
         ...
 
 
