@@ -16,7 +16,7 @@ from polytopes import HPolytope
 from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.observers.window import observer as window_module
+from svo.observers.window import memory
 from svo.observers.window.chain import prove_chain
 from svo.observers.window.output_injection import can_inject
 from tests.svo.observers import oracle
@@ -153,7 +153,7 @@ def test_the_alarm_comes_with_the_sample_of_a_program_that_keeps_w(monkeypatch: 
     found = []
     for inject in (True, False):
         if not inject:
-            monkeypatch.setattr(window_module, "can_inject", lambda model: False)
+            monkeypatch.setattr(memory, "can_inject", lambda model: False)
         alarms = []
         for seed in range(12):
             model, log = random_run(seed, 14)
