@@ -16,11 +16,8 @@ def exports() -> Iterator[tuple[str, Any]]:
     """Functions and classes of our own that a face lists."""
     for face in FACES:
         module = import_module(face)
-        own = [name for name, item in vars(module).items() if getattr(item, "__module__", "") == face]
-        for name in getattr(module, "__all__", own):
+        for name in module.__all__:
             found = getattr(module, name)
-            if name[0] == "_":
-                continue
             if inspect.isclass(found) or inspect.isroutine(found):
                 yield f"{face}.{name}", found
 
