@@ -12,6 +12,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.exact import (
     ZERO,
     Multipliers,
@@ -23,7 +24,6 @@ from polytopes.exact import (
     to_floats,
 )
 
-Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
 _NO_BITS = 2**20  # exponent of the last bit of zero
 

@@ -1,8 +1,8 @@
 """The image ``{M x + t : x in P}`` of a set under an affine map, whose support is ``h_P(M'c) + c't``."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.generators import in_integers
 from polytopes.integers import exact_product, integer_rows, short
 from polytopes.minkowski_weyl import image
@@ -12,7 +12,6 @@ from polytopes.projection import project
 from polytopes.rows import Rows, Table, nothing
 from polytopes.support import is_bounded, known_nonempty
 
-Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
 _DIRECT = 1e8  # condition number up to which an image is formed with the inverse of the map
 _MAX_ROWS = 20_000

@@ -8,9 +8,9 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.exact import ZERO, Multipliers, combine, power_of_two, rational, rational_matrix, refutes
 
-Floats = NDArray[np.float64]
 _ZERO_WEIGHT = 1e-13  # of the largest float multiplier: below, a row takes no part in a proof
 
 

@@ -3,10 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
-
-Floats = NDArray[np.float64]
 
 
 def contains_points(P: Rows, points: Floats, tol: float) -> NDArray[np.bool_]:

@@ -4,12 +4,10 @@ import importlib
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from polytopes.checks import real_array
+from polytopes.checks import Floats, real_array
 from polytopes.hpolytope import HPolytope
-
-Floats = NDArray[np.float64]
 
 
 def to_halfspaces(P: HPolytope) -> Floats:

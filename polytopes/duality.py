@@ -7,11 +7,10 @@ same bounds along the axes prove one of |x|.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes.affine import exact_sums
+from polytopes.checks import Floats
 
-Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
 
 

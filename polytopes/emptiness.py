@@ -10,13 +10,12 @@ from typing import Literal
 
 import numpy as np
 from flint import fmpq
-from numpy.typing import NDArray
 
 from polytopes.certificate import Certificate, HasRows, complete_certificate, exact_combination
+from polytopes.checks import Floats
 from polytopes.exact import ZERO, Multipliers, combine, to_floats
 from polytopes.linear_program import Program, prepare
 
-Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
 
 

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from flint import fmpq, fmpq_mat
-from numpy.typing import NDArray
 
 from polytopes.affine import AffineSet
+from polytopes.checks import Floats
 from polytopes.exact import ZERO, rational_matrix, rational_vector
 
-Floats = NDArray[np.float64]
 _MAX_VARIABLES = 40  # above, a rational basis costs too much
 _MAX_ENTRIES = 40_000
 _MAX_PIVOTS = 400

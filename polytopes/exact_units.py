@@ -8,10 +8,10 @@ from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
 from polytopes.affine import AffineSet
+from polytopes.checks import Floats
 from polytopes.exact import power_of_two, to_floats
 from polytopes.exact_simplex import ExactOutcome, affordable, exact_feasibility, exact_maximum
 
-Floats = NDArray[np.float64]
 Exponents = NDArray[np.int64]
 
 

@@ -12,14 +12,13 @@ linear programs (a pruned row takes its history with it), so it is not used.
 import logging
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes import kernel
+from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError
 from polytopes.linear_program import warm_up
 from polytopes.redundancy import settle
 
-Floats = NDArray[np.float64]
 _LOG = logging.getLogger("polytopes")
 
 

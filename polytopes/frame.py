@@ -4,12 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.exact import substituted
 from polytopes.linear_program import OPTIMAL, prepare_as_given
 
-Floats = NDArray[np.float64]
 Oracle = Callable[[Floats], Floats]  # directions (k, n) -> a maximiser for each, (k, n)
 _EVEN = 0.05  # smallest spread of the support points at which the axes are good enough
 _NOISE = 1e-15  # width, relative to the coordinates of the points, below which it is rounding

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.exact_generators import integer_form
 from polytopes.hull import nearly_flat, outer_rows, point_offsets
@@ -15,7 +15,6 @@ from polytopes.rows import Rows, Table
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
 
-Floats = NDArray[np.float64]
 _FEW = 200  # long points up to which a flat hull is found in integers
 
 

@@ -11,7 +11,7 @@ from polytopes import containment, plotting, projection, reduction, sampling
 from polytopes import support as support_functions
 from polytopes.affine_hull import affine_dim
 from polytopes.affine_image import affine_image
-from polytopes.checks import different_coordinates, real_array, real_number, whole_number
+from polytopes.checks import Floats, different_coordinates, real_array, real_number, whole_number
 from polytopes.emptiness import Emptiness
 from polytopes.generators import Generators, generators, rows_of_generators
 from polytopes.inner_box import inner_box
@@ -26,8 +26,6 @@ from polytopes.signatures import options_by_name
 from polytopes.support import Ball, SupportResult
 from polytopes.vertices import vertices
 from polytopes.volume import volume
-
-Floats = NDArray[np.float64]
 
 
 class HPolytope(Rows):

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.frame import Oracle, principal_axes, unit_frame
 from polytopes.qhull import point_hull
 from polytopes.redundancy import irredundant
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _FLAT = 1e-12  # relative width below which points are taken to lie in a subspace
 _EPS = float(np.finfo(np.float64).eps)

@@ -1,13 +1,11 @@
 """A box inside a set."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.errors import UnboundedError
 from polytopes.rows import Rows
 from polytopes.support import bounding_box, maxima
-
-Floats = NDArray[np.float64]
 
 
 def inner_box(P: Rows) -> tuple[Floats, Floats]:

@@ -7,9 +7,9 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.double_description import Integers, primitive
 
-Floats = NDArray[np.float64]
 SHORT = 2**32
 """Rows whose primitive integers stay below are short: sets of short rows are computed with exactly."""
 

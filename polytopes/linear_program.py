@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from polytopes import kernel
 from polytopes.affine import AffineSet, affine_set
+from polytopes.checks import Floats
 from polytopes.duality import Bounds, multiplier_bounds, proved_reach
 from polytopes.exact import rounded_up, to_floats
 from polytopes.exact_units import EvenRows, weights_of
 from polytopes.highs import HighsProgram
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _KERNEL_VARIABLES = 40

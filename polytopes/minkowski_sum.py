@@ -1,8 +1,8 @@
 """The Minkowski sum ``P + Q = {x + y : x in P, y in Q}``, whose support is the sum of the supports."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError
 from polytopes.generators import in_integers
 from polytopes.hull import hull_normals
@@ -14,7 +14,6 @@ from polytopes.rows import Rows, Table, nothing
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
 
-Floats = NDArray[np.float64]
 _MAX_SUMS = 4_000  # sums of vertices up to which integers are affordable
 _CHEAP_ROWS = 1000
 

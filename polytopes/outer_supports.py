@@ -12,6 +12,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
 from polytopes.integers import up
@@ -20,7 +21,6 @@ from polytopes.outward_normals import support_of
 from polytopes.rows import Rows
 from polytopes.support import maxima
 
-Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
 _SHARP = 1e-7  # of the radius of a largest ball: rounding beyond, and the support is worth rational arithmetic
 _TINY = float(np.finfo(np.float64).tiny)

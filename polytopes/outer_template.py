@@ -1,12 +1,10 @@
 """The template ``{x : T x <= h_P(T)}``: the smallest set with given normals that contains P."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.outer_supports import upper_supports
 from polytopes.rows import Rows
-
-Floats = NDArray[np.float64]
 
 
 def outer_template(P: Rows, directions: Floats) -> tuple[Floats, Floats]:

@@ -8,16 +8,14 @@ the facets of its shadow along the slab.
 
 import numpy as np
 from flint import fmpq_mat, fmpz_mat
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.double_description import Integers, null_space, primitive
 from polytopes.hull import nearly_flat
 from polytopes.integers import are_floats, as_floats, floats_of_directions, floats_of_points, integer_rows
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, rows_of, shadow, stacked
 from polytopes.outward_normals import OutwardNormals
 from polytopes.rows import Table
-
-Floats = NDArray[np.float64]
 
 
 def float_rows(generators: ExactGenerators) -> Table:

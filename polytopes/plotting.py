@@ -3,14 +3,13 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.projection import project
 from polytopes.rows import Rows
 from polytopes.support import bounding_box, known_nonempty, support_points
 from polytopes.vertices import vertices
 
-Floats = NDArray[np.float64]
 _MAX_ROWS = 20_000
 _REACH = 1e-9  # of a set's extent, within which points are one in a picture
 

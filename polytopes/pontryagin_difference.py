@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.integers import is_short, up
 from polytopes.linear_program import Program
@@ -13,7 +13,6 @@ from polytopes.outer_supports import exact_supports, lower_supports
 from polytopes.rows import Rows, Table, everything, nothing
 from polytopes.support import maxima
 
-Floats = NDArray[np.float64]
 _CONSTANT = 1e-12  # of the terms of a linear form: variation that counts as none, unless all numbers are short
 _ROUNDED = 1e-9  # radius of a largest ball, relative to the size of b, from which rounding makes no difference
 

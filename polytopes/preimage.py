@@ -1,8 +1,8 @@
 """The preimage ``{x : M x + t in P}`` of a set under an affine map: ``A M x <= b - A t``, ``C M x = d - C t``."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.double_description import primitive
 from polytopes.errors import UndecidedError
 from polytopes.exact_generators import LONG_RAYS, integer_form
@@ -12,7 +12,6 @@ from polytopes.outer_supports import reach
 from polytopes.outward import float_rows, nearest_floats
 from polytopes.rows import Rows, Table, nothing
 
-Floats = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
 
 

@@ -19,10 +19,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from flint import fmpq
-from numpy.typing import NDArray
 
 from polytopes.affine import AffineSet, affine_set
 from polytopes.affine_hull import explicit
+from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
 from polytopes.exact_generators import few_generators
@@ -36,7 +36,6 @@ from polytopes.rows import Rows
 from polytopes.support import known_nonempty, maxima
 from polytopes.vertices import vertices
 
-Floats = NDArray[np.float64]
 METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
 _UNBOUNDED = "the projection is unbounded; only method='fourier-motzkin' can describe it."
 _CHEAP_ROWS = 3000  # rows of one step; beyond, another method was faster in every measured case
@@ -109,9 +108,7 @@ def _equalities_left(flat: AffineSet, keep: Sequence[int]) -> tuple[Floats, Floa
     return C[:, list(keep)], d
 
 
-def _project_body(
-    P: Rows, k: int, inner: Floats, method: str, max_rows: int, outer: bool
-) -> tuple[Floats, Floats]:
+def _project_body(P: Rows, k: int, inner: Floats, method: str, max_rows: int, outer: bool) -> tuple[Floats, Floats]:
     """The same for a full-dimensional set of inequalities and its first k coordinates."""
     if method == "auto":
         return _project_automatically(P, k, inner, max_rows, outer)

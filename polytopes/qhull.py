@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 
-Floats = NDArray[np.float64]
 _TURNS = 4
 
 

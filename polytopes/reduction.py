@@ -3,12 +3,10 @@
 import heapq
 
 import numpy as np
-from numpy.typing import NDArray
 
+from polytopes.checks import Floats
 from polytopes.linear_program import OPTIMAL, prepare
 from polytopes.rows import Rows
-
-Floats = NDArray[np.float64]
 
 
 def reduced_rows(P: Rows, max_facets: int) -> tuple[Floats, Floats]:

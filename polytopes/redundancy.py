@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from polytopes import kernel
 from polytopes.affine_hull import explicit
+from polytopes.checks import Floats
 from polytopes.exact import rational, rational_matrix, rational_vector
 from polytopes.exact_simplex import affordable
 from polytopes.frame import unit_body
@@ -12,7 +13,6 @@ from polytopes.linear_program import Program, prepare, warm_up
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 

@@ -5,15 +5,14 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from polytopes.checks import real_array
+from polytopes.checks import Floats, real_array
 from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
 from polytopes.linear_program import Program, prepare
 from polytopes.minkowski_weyl import ExactGenerators
 
-Floats = NDArray[np.float64]
 Table = tuple[Floats, Floats, Floats, Floats]
 """Rows A, b, C, d: what the operations hand to the constructor of a set."""
 

@@ -1,16 +1,15 @@
 """Random points of bounded sets."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes.affine_hull import explicit
+from polytopes.checks import Floats
 from polytopes.errors import EmptySetError, UnboundedError
 from polytopes.frame import unit_frame
 from polytopes.linear_program import prepare_as_given
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
 
-Floats = NDArray[np.float64]
 _STEPS = 20  # steps per coordinate between two points that are kept
 
 

@@ -6,14 +6,12 @@ The support function of P is ``h_P(c) = max {c'x : x in P}``: +inf where P is un
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from polytopes.checks import real_array
+from polytopes.checks import Floats, real_array
 from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.linear_program import UNDECIDED, Maxima
 from polytopes.rows import Rows
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

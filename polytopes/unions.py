@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from polytopes.checks import listed, real_array
+from polytopes.checks import Floats, listed, real_array
 from polytopes.generators import in_integers
 from polytopes.hpolytope import HPolytope
 from polytopes.hull import outer_rows
@@ -15,8 +15,6 @@ from polytopes.outward import float_rows
 from polytopes.rows import Rows, Table, nothing, same_space
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
-
-Floats = NDArray[np.float64]
 
 
 def convex_hull(sets: Sequence[HPolytope]) -> HPolytope:

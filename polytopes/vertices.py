@@ -5,9 +5,9 @@ about unit size along its own axes; flat sets are handled in their subspace.  Po
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polytopes.affine_hull import explicit
+from polytopes.checks import Floats
 from polytopes.errors import UnboundedError, UndecidedError
 from polytopes.frame import UnitBody, unit_body
 from polytopes.integers import floats_of_points
@@ -16,7 +16,6 @@ from polytopes.redundancy import facets
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
 
-Floats = NDArray[np.float64]
 _SAME = 1e-9  # relative distance below which two computed vertices are one
 _RANK = float(np.finfo(np.float64).eps)  # relative singular value, per row, that counts as zero
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 from flint import fmpq, fmpq_mat
-from numpy.typing import NDArray
 
 from polytopes.affine_hull import affine_dim
 from polytopes.errors import UndecidedError
@@ -13,8 +12,6 @@ from polytopes.qhull import points_volume
 from polytopes.rows import Rows
 from polytopes.support import is_bounded
 from polytopes.vertices import listed, vertices
-
-Floats = NDArray[np.float64]
 
 
 def volume(P: Rows) -> float:
