@@ -131,7 +131,12 @@ class IntervalCertificate(Certificate):
     upper: Array
 
     def verify(self) -> bool:
-        return self.samples[-1].explained(between(self.lower.tolist(), self.upper.tolist())) is None
+        """A stored proof may hold anything: an error while it is checked, or an empty set before, proves nothing."""
+        try:
+            before = between(self.lower.tolist(), self.upper.tolist())
+            return all(low <= high for low, high in before) and self.samples[-1].explained(before) is None
+        except (AttributeError, LookupError, OverflowError, TypeError, ValueError):
+            return False
 
     def premise(self, sample: int) -> str:
         return f"the bounds of the state at sample {sample} before its readings"
