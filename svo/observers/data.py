@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:
     array = floats("y", y, missing=True)
     if array.shape != (model.n_outputs,):
         raise ValueError(f"y has shape {array.shape}; expected ({model.n_outputs},), one value a sensor")
-    if np.isinf(array).any():
+    if any(map(math.isinf, array.tolist())):  # at every sample: short arrays, for which this is fastest
         raise ValueError(f"y is {array}; expected finite numbers, or NaN for a missing sensor")
     return array
 
@@ -32,7 +33,7 @@ def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: boo
     array = floats(name, u)
     if array.shape != (size,):
         raise ValueError(f"{name} has shape {array.shape}; expected ({size},), one value an input")
-    if not np.isfinite(array).all():
+    if not all(map(math.isfinite, array.tolist())):
         raise ValueError(f"{name} is {array}; expected finite numbers")
     return array
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
+from copy import copy
 from itertools import dropwhile
 from typing import Any
 
@@ -48,11 +49,14 @@ class Readings:
     def is_full(self) -> bool:
         return len(self.samples) == self.samples.maxlen
 
-    def add(self, u: Array, reading: Reading) -> None:
-        """The next sample; u drives the transition to it."""
-        if self.samples:
-            self.samples[-1] = self.samples[-1]._replace(u=u.copy())
-        self.samples.append(usable(reading))
+    def added(self, u: Array, reading: Reading) -> Readings:
+        """These and the next sample; u drives the transition to it."""
+        more = copy(self)
+        more.samples = self.samples.copy()
+        if more.samples:
+            more.samples[-1] = more.samples[-1]._replace(u=u.copy())
+        more.samples.append(usable(reading))
+        return more
 
     def add_late(self, y: Array, age: int) -> None:
         """Values of a sample that came ``age`` samples ago, if it is still kept; NaN = not these."""

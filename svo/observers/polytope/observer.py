@@ -16,7 +16,7 @@ from svo.checks import Array, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm, set_in
 from svo.models.stack import may_be_nonzero
-from svo.observers.base import Observer
+from svo.observers.answers import Step
 from svo.observers.data import relative_slack, stack_at
 from svo.observers.first_states import finite_box
 from svo.observers.free_start import Reading
@@ -42,7 +42,8 @@ from svo.observers.polytope.state import (
 )
 from svo.observers.polytope.step import PolytopeStep
 from svo.observers.polytope.vertex_images import transitions
-from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, TOO_LARGE, Readings
+from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, TOO_LARGE
+from svo.observers.recursion import RecursiveObserver
 from svo.observers.window_kernel import LARGEST
 
 _PUBLISHED_STACKS = 4096
@@ -55,7 +56,7 @@ UNSOUND = (
 )
 
 
-class PolytopeObserver(Observer):
+class PolytopeObserver(RecursiveObserver[Sample]):
     """Set-valued observer on explicit polytopes (Rosa and Silvestre 2013, section 2), in a form that is sound.
 
     The set of the next state is the intersection over m = 1..N of the hulls, over the vertices of Delta, of the
@@ -95,7 +96,7 @@ class PolytopeObserver(Observer):
     """
 
     kind = "polytope"
-    saves_state = starts_without_set = True
+    saves_state = True
 
     @options_by_name
     def __init__(
@@ -130,6 +131,7 @@ class PolytopeObserver(Observer):
     ) -> None:
         self.model, self._form, self._normal = form.given, form, form.model
         self.horizon, self.max_facets, self.eps = horizon, max_facets, eps
+        self._steps_kept = horizon
         self._recursion: Recursion
         if as_published:
             self._recursion = PublishedRecursion(form.model, horizon, max_facets, eps)
@@ -143,36 +145,20 @@ class PolytopeObserver(Observer):
 
     def _begin_from(self, initial: HPolytope) -> None:
         """Nothing is known but a set of first states."""
-        self._initial = initial
+        self._initial, self._readings = initial, None
+        self._drop()
+
+    def _start_from(self, lower: Array, upper: Array) -> None:
+        self._initial = HPolytope.box(lower, upper)
+
+    def _drop(self) -> None:
         self._last: tuple[Sample, Outcome] | None = None
-        self._readings: Readings | None = None  # of an observer that has lost its set
 
-    def _lose_set(self) -> None:
-        largest = self._normal.start_range
-        if largest is None:
-            self._lose()
-        else:
-            self._begin_from(HPolytope.box(largest.lower, largest.upper))
-            self.largest_at = 0
+    def _update(self, y: Array, u: Array, schedule: Any) -> Step:
+        return self._checked(super()._update(y, u, schedule), y)
 
-    def _lose(self) -> None:
-        """There is no set any more."""
-        self._last, self.largest_at = None, None
-        self._readings = Readings(self._normal, self.eps, self.horizon)
-
-    def _update(self, y: Array, u: Array, schedule: Any) -> PolytopeStep:
-        sample = self._sample(y, u, schedule)
-        if self._readings is not None:
-            return self._checked(self._without_set(sample.u, sample), sample, y)
-        return self._checked(self._begin(sample), sample, y)
-
-    def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> PolytopeStep:
-        sample, driven = self._sample(y, u_next, schedule), self._form.inputs(u)
-        if self._readings is not None:
-            step = self._without_set(driven, sample)
-        else:
-            step = self._go_on(driven, sample) or self._give_up(driven, sample)
-        return self._checked(step, sample, y)
+    def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> Step:
+        return self._checked(super()._step(u, y, u_next, schedule, end), y)
 
     def _warm_up(self) -> None:
         warm_up()
@@ -189,8 +175,7 @@ class PolytopeObserver(Observer):
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state["restart"] = np.array([self._number, largest, self._readings is not None])
         state |= self._form.state_dict() | write_set("initial", self._initial)
-        if self._readings is not None:
-            state |= self._readings.state()
+        state |= self._saved_readings()
         if self._last is not None:
             sample, outcome = self._last
             state |= write_sample("sample", sample) | write_outcome("outcome", outcome)
@@ -205,9 +190,7 @@ class PolytopeObserver(Observer):
         self._begin_from(read_set(state, "initial"))
         number, largest, lost = (int(v) for v in state["restart"])
         self._number, self.largest_at = number, None if largest == NO_SAMPLE else largest
-        if lost:
-            self._readings = Readings(self._normal, self.eps, self.horizon)
-            self._readings.restore(state)
+        self._restore_readings(lost, state)
         if "sample.stack" not in state:
             return None
         sample, outcome = read_sample(state, "sample"), read_outcome(state, "outcome")
@@ -218,16 +201,9 @@ class PolytopeObserver(Observer):
 
     # -- inside ------------------------------------------------------------------------------------
 
-    def _sample(self, y: Array, u: Array, schedule: Any) -> Sample:
-        """Model and data of a sample, in normal form."""
-        form = self._form
-        stack, (lower, upper, noise) = stack_at(form.model, schedule), form.model.bounds(schedule)
-        disturbances, read = self._disturbances(lower, upper), readable(form.outputs(y))
-        return Sample(self._number, stack, disturbances, noise, form.inputs(u), read, (lower, upper))
-
-    def _checked(self, step: PolytopeStep, sample: Sample, y: Array) -> PolytopeStep:
+    def _checked(self, step: Step, y: Array) -> Step:
         """An answer that says so where a reading was too large to count."""
-        if step.verdict == "consistent" and (np.isnan(sample.y) & ~np.isnan(y)).any():
+        if step.verdict == "consistent" and (np.isnan(readable(self._form.outputs(y))) & ~np.isnan(y)).any():
             return replace(step, verdict="undecided", reason=TOO_LARGE)
         return step
 
@@ -251,74 +227,46 @@ class PolytopeObserver(Observer):
         polytope = self._normal.disturbance_polytope
         return HPolytope.box(lower, upper) if polytope is None and lower.size else polytope
 
-    # -- a set that is lost ------------------------------------------------------------------------
+    # -- the recursion -----------------------------------------------------------------------------
 
-    def _begin(self, sample: Sample) -> PolytopeStep:
-        """The first sample of a set."""
-        if not is_of_use(sample, sample.u):
-            return self._lost(sample.u, sample)
-        return self._keep(sample, self._recursion.first(self._initial, sample))
+    def _data(self, y: Array, u: Array, schedule: Any) -> Sample:
+        form = self._form
+        stack, (lower, upper, noise) = stack_at(form.model, schedule), form.model.bounds(schedule)
+        disturbances, read = self._disturbances(lower, upper), readable(form.outputs(y))
+        return Sample(self._number, stack, disturbances, noise, form.inputs(u), read, (lower, upper))
 
-    def _go_on(self, u: Array, sample: Sample) -> PolytopeStep | None:
-        """The next sample, or None if the set has outgrown all bounds."""
+    def _again(self, reading: Reading, number: int) -> Sample:
+        box = reading.w_lower, reading.w_upper
+        return Sample(number, reading.stack, self._disturbances(*box), reading.noise, reading.u, reading.y, box)
+
+    def _reading(self, data: Sample) -> Reading:
+        slack = np.zeros(self._normal.n_outputs)
+        return Reading(data.stack, data.u, data.y, data.noise, slack, *data.w_box)
+
+    def _begin(self, data: Sample) -> PolytopeStep | None:
+        if not is_of_use(data, data.u):
+            return None
+        return self._keep(data, self._recursion.first(self._initial, data))
+
+    def _go_on(self, u: Array, data: Sample) -> PolytopeStep | None:
         assert self._last is not None
         before, last = self._last
-        if not (is_of_use(before, u) and is_of_use(sample, sample.u)):
+        if not (is_of_use(before, u) and is_of_use(data, data.u)):
             return None
         size = reach_ahead(self._normal, before, last.joint, u)
         if not size < LARGEST:
             return None
         try:
             maps = transitions(before.stack, self._normal, u)
-            return self._keep(sample, self._recursion.next(last, before, maps, sample))
+            return self._keep(data, self._recursion.next(last, before, maps, data))
         except (UndecidedError, np.linalg.LinAlgError):
             if size < FLOATS_TELL_APART:
                 raise
             return None
 
-    def _give_up(self, u: Array, sample: Sample) -> PolytopeStep:
-        """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
-        largest = self._normal.start_range
-        if largest is None:
-            return self._lost(u, sample)
-        self._initial, self.largest_at = HPolytope.box(largest.lower, largest.upper), sample.number
-        return self._begin(sample)
-
-    def _lost(self, u: Array, sample: Sample) -> PolytopeStep:
-        self._lose()
-        return self._without_set(u, sample)
-
-    def _without_set(self, u: Array, sample: Sample) -> PolytopeStep:
-        """A sample of an observer that has no set: it starts again once the readings alone bound the state."""
-        assert self._readings is not None
-        slack = np.zeros(self._normal.n_outputs)
-        self._readings.add(u, Reading(sample.stack, sample.u, sample.y, sample.noise, slack, *sample.w_box))
-        found = self._readings.start()
-        if found is not None:
-            step = self._start_again(*found)
-            if step is not None:
-                return step
+    def _unknown(self) -> PolytopeStep:
         joint = anywhere(self._normal.n_states, self._normal.physical_range)
         return PolytopeStep(joint, self._form, verdict="undecided", reason=OUTGROWN)
-
-    def _start_again(self, samples: list[Reading], lower: Array, upper: Array) -> PolytopeStep | None:
-        """From bounds of the state at the first of some samples; None if a set does not come out of it."""
-        readings = self._readings
-        physical = self._normal.physical_range
-        if physical is not None:
-            lower, upper, _ = physical.cut(lower, upper)
-        self._readings, self._initial = None, HPolytope.box(lower, upper)
-        step = None
-        for j, s in enumerate(samples):
-            disturbances = self._disturbances(s.w_lower, s.w_upper)
-            at, box = self._number - len(samples) + 1 + j, (s.w_lower, s.w_upper)
-            sample = Sample(at, s.stack, disturbances, s.noise, s.u, s.y, box)
-            step = self._begin(sample) if j == 0 else self._go_on(samples[j - 1].u, sample)
-            if step is None or step.reason == OUTGROWN or (step.verdict == "falsified" and j + 1 < len(samples)):
-                # a proof before the last sample would rest on readings that come after it
-                self._readings, self._last = readings, None
-                return None
-        return step
 
 
 def _check_published(model: UncertainModel, coupled: bool, horizon: int) -> None:

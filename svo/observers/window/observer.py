@@ -197,8 +197,8 @@ class WindowObserver(Observer):
         known = self._form.outputs(y)
         if self._readings is not None:
             self._readings.add_late(known, self._number - sample)
-        if self._lost:
-            return self._said(self._start_from_readings() or "undecided")
+            if self._lost:
+                return self._said(self._start_from(self._readings) or "undecided")
         return self._said(self._window.add_late(known, sample))
 
     def _warm_up(self) -> None:
@@ -327,8 +327,11 @@ class WindowObserver(Observer):
 
     def _without_set(self, sample: Sample) -> VerdictName:
         assert self._readings is not None
-        self._readings.add(sample.u, sample.reading)
-        return self._start_from_readings() or "undecided"
+        readings = self._readings.added(sample.u, sample.reading)
+        verdict = self._start_from(readings)
+        if verdict is None:
+            self._readings = readings
+        return verdict or "undecided"
 
     def _new_readings(self) -> Readings:
         return Readings(self._normal, self.eps, self.horizon or 0)
@@ -360,11 +363,10 @@ class WindowObserver(Observer):
             self._missing = np.where(absent, self._missing + 1, 0)
             if not (returned.any() and self._is_blurred(returned, sample)):
                 return verdict
-            self._readings = self._new_readings()
-        self._readings.add(sample.u, sample.reading)
-        better = self._start_from_readings()
-        if better is None and self._readings is not None and self._readings.is_full:
-            self._readings = None
+        readings = (self._readings or self._new_readings()).added(sample.u, sample.reading)
+        better = self._start_from(readings)
+        if better is None:
+            self._readings = None if readings.is_full else readings
         return better or verdict
 
     def _is_blurred(self, returned: NDArray[np.bool_], sample: Sample) -> bool:
@@ -374,10 +376,9 @@ class WindowObserver(Observer):
 
     # -- the set is found ------------------------------------------------------------------------------
 
-    def _start_from_readings(self) -> VerdictName | None:
-        """Start again where the readings alone bound the state, if they do and it is the better set."""
-        assert self._readings is not None
-        found = self._readings.start()
+    def _start_from(self, readings: Readings) -> VerdictName | None:
+        """Start again where readings alone bound the state, if they do and it is the better set."""
+        found = readings.start()
         if found is None:
             return None
         samples, lower, upper = found

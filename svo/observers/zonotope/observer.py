@@ -16,12 +16,12 @@ from svo.checks import Array, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
 from svo.observers.answers import VerdictName
-from svo.observers.base import Observer
 from svo.observers.data import relative_slack, stack_at
 from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
-from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
+from svo.observers.readings import NO_SAMPLE, OUTGROWN
+from svo.observers.recursion import RecursiveObserver
 from svo.observers.window.evidence import WindowSample
 from svo.observers.window.setup import arrival_of, needs_next_input
 from svo.observers.window_kernel import LARGEST
@@ -35,7 +35,7 @@ from svo.observers.zonotope.zonotope import ConstrainedZonotope
 _SAMPLE = ("stack", "u", "y", "noise", "w_lower", "w_upper")
 
 
-class ConstrainedZonotopeObserver(Observer):
+class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
     """Set-valued observer on constrained zonotopes (Scott et al., Automatica 69, 2016), in a form that is sound.
 
     {c + G xi : |xi| <= 1, A xi = b} is closed under affine maps, sums and measurements; each sample adds generators and
@@ -65,7 +65,7 @@ class ConstrainedZonotopeObserver(Observer):
     """
 
     kind = "constrained zonotope"
-    saves_state = starts_without_set = True
+    saves_state = True
 
     @options_by_name
     def __init__(
@@ -102,27 +102,14 @@ class ConstrainedZonotopeObserver(Observer):
 
     def _begin_from(self, first: ConstrainedZonotope) -> None:
         """Nothing is known but a set of first states."""
-        self._first = first
+        self._first, self._readings = first, None
+        self._drop()
+
+    def _start_from(self, lower: Array, upper: Array) -> None:
+        self._first = ConstrainedZonotope.box(lower, upper)
+
+    def _drop(self) -> None:
         self._stages: tuple[Stage, ...] = ()  # the last one goes on to the next sample
-        self._readings: Readings | None = None  # of an observer that has lost its set
-
-    def _lose_set(self) -> None:
-        largest = self._normal.start_range
-        self._begin_from(self._first)
-        if largest is None:
-            self._readings = Readings(self._normal, self.eps)
-        else:
-            self._first, self.largest_at = ConstrainedZonotope.box(largest.lower, largest.upper), 0
-
-    def _update(self, y: Array, u: Array, schedule: Any) -> ZonotopeStep:
-        data = self._data(u, y, schedule)
-        return self._begin(data) if self._readings is None else self._without_set(data.u, data)
-
-    def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> ZonotopeStep:
-        data, driven = self._data(u_next, y, schedule), self._form.inputs(u)
-        if self._readings is not None:
-            return self._without_set(driven, data)
-        return self._go_on(driven, data) or self._give_up(driven, data)
 
     def _warm_up(self) -> None:
         other = copy(self)
@@ -141,8 +128,7 @@ class ConstrainedZonotopeObserver(Observer):
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state = {"settings": np.array(settings), "restart": np.array([largest, self._readings is not None])}
         state |= _named("first", self._first) | self._form.state_dict()
-        if self._readings is not None:
-            state |= self._readings.state()
+        state |= self._saved_readings()
         for i, stage in enumerate(self._stages):
             state |= _named(f"{i}.arrival", stage.arrival)
             state |= {f"{i}.{name}": getattr(stage.data, name).copy() for name in _SAMPLE}
@@ -170,9 +156,7 @@ class ConstrainedZonotopeObserver(Observer):
                 stages[-1] = before
             stages.append(self._builder.measured(arrival, data))
         self._stages = tuple(stages)
-        if lost:
-            self._readings = Readings(self._normal, self.eps)
-            self._readings.restore(state)
+        self._restore_readings(lost, state)
         if not falsified:
             return None
         verdict, certificate = self._decide(self._stages[:-1], self._stages[-1])
@@ -180,16 +164,25 @@ class ConstrainedZonotopeObserver(Observer):
             raise ValueError("its falsification cannot be proven again")
         return self._answer(verdict, self._stages[-1], certificate)
 
-    # -- a set that is lost ------------------------------------------------------------------------
+    # -- the recursion -----------------------------------------------------------------------------
 
-    def _begin(self, data: WindowSample) -> ZonotopeStep:
-        """The first sample of a set."""
+    def _data(self, y: Array, u: Array, schedule: Any) -> WindowSample:
+        form, model = self._form, self._normal
+        return self._builder.data(stack_at(model, schedule), model.bounds(schedule), form.inputs(u), form.outputs(y))
+
+    def _again(self, reading: Reading, number: int) -> WindowSample:
+        bounds = reading.w_lower, reading.w_upper, reading.noise
+        return self._builder.data(reading.stack, bounds, reading.u, reading.y)
+
+    def _reading(self, data: WindowSample) -> Reading:
+        return Reading(data.stack, data.u, data.y, data.noise, data.slack, data.w_lower, data.w_upper)
+
+    def _begin(self, data: WindowSample) -> ZonotopeStep | None:
         with np.errstate(over="ignore", invalid="ignore"):
             now = self._builder.measured(self._first, data)
-        return self._conclude((), now, None) if now.joint.within(LARGEST) else self._lost(data.u, data)
+        return self._conclude((), now, None) if now.joint.within(LARGEST) else None
 
     def _go_on(self, u: Array, data: WindowSample) -> ZonotopeStep | None:
-        """The next sample, or None if the set has outgrown all bounds."""
         with np.errstate(over="ignore", invalid="ignore"):
             before, states = self._builder.predicted(self._stages[-1], u)
             if not states.within(LARGEST):
@@ -197,48 +190,8 @@ class ConstrainedZonotopeObserver(Observer):
             now = self._builder.measured(states, data)
         return self._conclude((before,), now, states) if now.joint.within(np.inf) else None
 
-    def _give_up(self, u: Array, data: WindowSample) -> ZonotopeStep:
-        """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
-        largest = self._normal.start_range
-        if largest is None:
-            return self._lost(u, data)
-        self._first, self.largest_at = ConstrainedZonotope.box(largest.lower, largest.upper), self._number
-        return self._begin(data)
-
-    def _lost(self, u: Array, data: WindowSample) -> ZonotopeStep:
-        self._stages, self.largest_at, self._readings = (), None, Readings(self._normal, self.eps)
-        return self._without_set(u, data)
-
-    def _without_set(self, u: Array, data: WindowSample) -> ZonotopeStep:
-        """A sample of an observer that has no set: it starts again once the readings alone bound the state."""
-        assert self._readings is not None
-        self._readings.add(u, Reading(data.stack, data.u, data.y, data.noise, data.slack, data.w_lower, data.w_upper))
-        found = self._readings.start()
-        return (found and self._start_again(*found)) or self._answer("undecided", None, None)
-
-    def _start_again(self, samples: list[Reading], lower: Array, upper: Array) -> ZonotopeStep | None:
-        """From bounds of the state at the first of some samples; None if a set does not come out of it."""
-        readings = self._readings
-        physical = self._normal.physical_range
-        if physical is not None:
-            lower, upper, _ = physical.cut(lower, upper)
-        self._readings, self._first = None, ConstrainedZonotope.box(lower, upper)
-        step = None
-        for j, s in enumerate(samples):
-            data = self._builder.data(s.stack, (s.w_lower, s.w_upper, s.noise), s.u, s.y)
-            step = self._begin(data) if j == 0 else self._go_on(samples[j - 1].u, data)
-            if step is None or step.reason is not None or (step.verdict == "falsified" and j + 1 < len(samples)):
-                # a proof before the last sample would rest on readings that come after it
-                self._readings, self._stages = readings, ()
-                return None
-        return step
-
-    # -- inside ------------------------------------------------------------------------------------
-
-    def _data(self, u: Array, y: Array, schedule: Any) -> WindowSample:
-        """Model and data of a sample, in normal form."""
-        form, model = self._form, self._normal
-        return self._builder.data(stack_at(model, schedule), model.bounds(schedule), form.inputs(u), form.outputs(y))
+    def _unknown(self) -> ZonotopeStep:
+        return self._answer("undecided", None, None)
 
     def _conclude(self, before: tuple[Stage, ...], now: Stage, states: ConstrainedZonotope | None) -> ZonotopeStep:
         """Decide whether anything explains the measurement, and keep what goes on to the next sample."""

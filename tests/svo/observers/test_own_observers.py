@@ -12,6 +12,7 @@ import pytest
 from polytopes import HPolytope
 from svo import ArchitectureI, ConstrainedZonotopeObserver, Log, PolytopeObserver, UncertainModel, WindowObserver
 from svo.observers.base import Observer, Step
+from svo.observers.readings import Readings
 
 TANK = UncertainModel([[0.9]], [[0.1]], [[1.0]], E=[[1.0]], w=[0.01], n=[0.05], Ts=1.0)
 START = HPolytope.box([0.0], [2.0])
@@ -116,6 +117,25 @@ def test_after_a_falsification_every_answer_is_that_of_the_falsification(kind: A
     assert (later.verdict, later.sample, later.certificate) == ("falsified", 1, alarm.certificate)
     observer.reset(START)
     assert observer.update([1.0]).sample == 0
+
+
+@pytest.mark.parametrize("kind", [WindowObserver, ConstrainedZonotopeObserver, PolytopeObserver])
+def test_a_sample_that_fails_without_a_set_can_be_given_again(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kept twice it would be a transition that never was."""
+    model = UncertainModel([[1.0, 1.0], [0.0, 1.0]], None, [[1.0, 0.0]], E=np.eye(2), w=[0.01, 0.01], n=[0.05], Ts=1.0)
+    start = HPolytope.box([-9.0, -9.0], [9.0, 9.0])
+    observer, twin = kind(model, start), kind(model, start)
+    for o in (observer, twin):
+        o.lose_set()
+        o.update([0.0])
+    with monkeypatch.context() as patch:
+        patch.setattr(Readings, "start", lambda self: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            observer.step(None, [1.0])
+    for y in (1.0, 2.0, 3.0):
+        steps = [o.step(None, [y]) for o in (observer, twin)]
+        np.testing.assert_array_equal(steps[0].box, steps[1].box)
+    assert steps[0].verdict == "consistent"
 
 
 class Clumsy(Hull):

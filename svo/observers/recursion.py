@@ -1,0 +1,150 @@
+"""An observer whose set goes from sample to sample, that loses it in a long gap and finds one again.
+
+A set that outgrows all bounds says nothing any more. Where the model states the largest set it starts again there, a
+premise of every later alarm; otherwise from the samples whose readings bound the state without anything before
+(`svo.observers.readings`): nothing is promised then. All in normal form.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, Generic, TypeVar
+
+from svo.checks import Array
+from svo.models.model import UncertainModel
+from svo.models.normal_form import NormalForm
+from svo.observers.answers import Step
+from svo.observers.base import Observer
+from svo.observers.free_start import Reading
+from svo.observers.readings import Readings
+from svo.observers.saved_state import State
+
+Data = TypeVar("Data")
+
+
+class RecursiveObserver(Observer, Generic[Data]):
+    """Hooks of a set that is kept from sample to sample; ``Data`` are model and data of a sample."""
+
+    starts_without_set = True
+
+    _form: NormalForm
+    _normal: UncertainModel
+    eps: float
+    _steps_kept: int = 0  # at least, of a set that is lost
+    _readings: Readings | None = None  # of an observer that has lost its set
+
+    @abstractmethod
+    def _data(self, y: Array, u: Array, schedule: Any) -> Data:
+        """Model and data of a sample, u its own input."""
+
+    @abstractmethod
+    def _again(self, reading: Reading, number: int) -> Data:
+        """The same of a sample that has been kept."""
+
+    @abstractmethod
+    def _reading(self, data: Data) -> Reading:
+        """A sample as it is kept."""
+
+    @abstractmethod
+    def _start_from(self, lower: Array, upper: Array) -> None:
+        """A box of first states."""
+
+    @abstractmethod
+    def _drop(self) -> None:
+        """Forget the set, but for that of first states."""
+
+    @abstractmethod
+    def _begin(self, data: Data) -> Step | None:
+        """The first sample of a set; None if the set has outgrown all bounds."""
+
+    @abstractmethod
+    def _go_on(self, u: Array, data: Data) -> Step | None:
+        """The next sample; None if the set has outgrown all bounds."""
+
+    @abstractmethod
+    def _unknown(self) -> Step:
+        """The answer without a set."""
+
+    # -- samples -----------------------------------------------------------------------------------
+
+    def _update(self, y: Array, u: Array, schedule: Any) -> Step:
+        data, known = self._data(y, u, schedule), self._form.inputs(u)
+        if self._readings is not None:
+            return self._without_set(known, data)
+        return self._begin(data) or self._lost(known, data)
+
+    def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> Step:
+        data, driven = self._data(y, u_next, schedule), self._form.inputs(u)
+        if self._readings is not None:
+            return self._without_set(driven, data)
+        return self._go_on(driven, data) or self._give_up(driven, data)
+
+    # -- a set that is lost ------------------------------------------------------------------------
+
+    def _lose_set(self) -> None:
+        largest = self._normal.start_range
+        if largest is None:
+            self._lose()
+        else:
+            self._drop()
+            self._start_from(largest.lower, largest.upper)
+            self._readings, self.largest_at = None, 0
+
+    def _lose(self) -> None:
+        """There is no set any more."""
+        self._drop()
+        self.largest_at, self._readings = None, Readings(self._normal, self.eps, self._steps_kept)
+
+    def _give_up(self, u: Array, data: Data) -> Step:
+        """The set has outgrown all bounds at this sample: it starts again from the largest set, if there is one."""
+        largest = self._normal.start_range
+        if largest is None:
+            return self._lost(u, data)
+        self._start_from(largest.lower, largest.upper)
+        self.largest_at = self._number
+        return self._begin(data) or self._lost(u, data)
+
+    def _lost(self, u: Array, data: Data) -> Step:
+        self._lose()
+        return self._without_set(u, data)
+
+    def _without_set(self, u: Array, data: Data) -> Step:
+        """A sample of an observer that has no set: it starts again once the readings alone bound the state."""
+        assert self._readings is not None
+        before, readings = self._readings, self._readings.added(u, self._reading(data))
+        step, self._readings = None, None
+        try:
+            found = readings.start()
+            step = found and self._start_again(*found)
+        except BaseException:
+            readings = before  # the sample may be given again
+            raise
+        finally:
+            if step is None:
+                self._drop()
+                self._readings = readings
+        return step or self._unknown()
+
+    def _start_again(self, samples: list[Reading], lower: Array, upper: Array) -> Step | None:
+        """From bounds of the state at the first of some samples; None if a set does not come out of it."""
+        physical, step = self._normal.physical_range, None
+        if physical is not None:
+            lower, upper, _ = physical.cut(lower, upper)
+        self._start_from(lower, upper)
+        for j, s in enumerate(samples):
+            data = self._again(s, self._number - len(samples) + 1 + j)
+            step = self._begin(data) if j == 0 else self._go_on(samples[j - 1].u, data)
+            if step is None or (step.verdict == "falsified" and j + 1 < len(samples)):
+                return None  # a proof before the last sample would rest on readings that come after it
+        return step
+
+    # -- saved states ------------------------------------------------------------------------------------
+
+    def _saved_readings(self) -> dict[str, Array]:
+        return {} if self._readings is None else self._readings.state()
+
+    def _restore_readings(self, lost: int, state: State) -> None:
+        self._readings = None
+        if lost:
+            self._readings = Readings(self._normal, self.eps, self._steps_kept)
+            self._readings.restore(state)
