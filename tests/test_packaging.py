@@ -61,7 +61,7 @@ def shipped() -> set[str]:
 def test_the_wheel_has_every_file_of_the_packages_and_nothing_else(archives: tuple[Path, Path]) -> None:
     names = {n for n in zipfile.ZipFile(archives[1]).namelist() if ".dist-info/" not in n}
     assert names == shipped()
-    page = {f"svo/studies/isolation/report.{ext}" for ext in ("js", "css")}
+    page = {f"svo/studies/pages/{name}" for name in ("report.js", "report.css", "page.html.j2")}
     assert page | {f"{p}/py.typed" for p in PACKAGES} <= names
 
 
@@ -89,7 +89,7 @@ def test_the_installed_package_works(installed: Path, tmp_path: Path) -> None:
     assert "eclipse" in run(installed / "svo", "plants", cwd=tmp_path)
     code = (
         "from importlib.resources import files; from polytopes import HPolytope; import svo; "
-        "assert files('svo.studies.isolation').joinpath('report.js').read_text(); "
+        "assert files('svo.studies').joinpath('pages', 'report.js').read_text(); "
         "print(svo.__file__, HPolytope.empty(2).emptiness().status)"
     )
     where, status = run(installed / "python", "-c", code, cwd=tmp_path).split()

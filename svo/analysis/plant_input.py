@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.input_design import InputDesign, design_input
 from svo.analysis.isolability import FaultFreeFlight, horizon_text, stated_faults
 from svo.checks import Array, finite_array
+from svo.logs.csv import write_csv
 from svo.plant import Plant
 
 
@@ -109,11 +109,8 @@ class PlantInput:
     def write(self, path: Path) -> None:
         """The designed inputs as CSV: time [s] and the columns of the inputs; needs a design that was found."""
         assert self.design.u is not None
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["time_s", *self.inputs])
-            for k, row in enumerate(self.design.u):
-                writer.writerow([repr(round(self.fault_time + k * self.Ts, 12)), *(repr(float(v)) for v in row)])
+        time = [round(self.fault_time + k * self.Ts, 12) for k in range(len(self.design.u))]
+        write_csv(path, {"time_s": np.array(time), **dict(zip(self.inputs, self.design.u.T, strict=True))})
 
 
 def plant_input(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from svo.isolation.alarms import AlarmCheck
     from svo.plant import Plant
     from svo.studies.isolation.summary import ConditionSummary
-    from svo.studies.thresholds.publish import DetectionStudy
+    from svo.studies.thresholds.results import DetectionStudy
 
 
 _SHOWN = 20  # failed checks
@@ -67,11 +67,12 @@ def print_json(value: Any) -> None:
 def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
     """Tables of a study, one a noise set, and what they count."""
     from svo.studies.isolation import tables
+    from svo.studies.tables import to_rich
 
     screen = console()
     for noise in dict.fromkeys(s.noise for s in summaries):
         chosen = [s for s in summaries if s.noise == noise]
-        screen.print(tables.to_rich(tables.delay_table(plant, chosen)))
+        screen.print(to_rich(tables.delay_table(plant, chosen)))
         for text in [*tables.counts(chosen), *tables.not_isolated(chosen), tables.cost(chosen)]:
             say(f"{text[0].upper()}{text[1:]}.")
         typer.echo("")
@@ -81,7 +82,7 @@ def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
 
 def print_detector_study(found: DetectionStudy) -> None:
     """Tables of a study of interval detectors, and what came out."""
-    from svo.studies.isolation.tables import to_rich
+    from svo.studies.tables import to_rich
 
     screen = console()
     for table in found.tables:

@@ -50,7 +50,6 @@ def test_nothing_reaches_for_another_modules_underscore() -> None:
     assert not {r for r in reaches if (r[2] or r[1].rpartition(".")[2]).startswith("_")}
 
 
-@pytest.mark.xfail(strict=True, raises=AssertionError, reason="svo.studies.thresholds.publish")
 def test_no_submodule_has_the_name_of_an_exported_function() -> None:
     packages = [name for name, path in modules().items() if path.name == "__init__.py"]
     assert not {f"{p}.{name}" for p in packages for name in exported(p)} & set(modules())

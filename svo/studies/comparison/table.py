@@ -16,7 +16,7 @@ from svo.store import write_csv
 from svo.studies.comparison.comparison import Compared
 from svo.studies.comparison.run import ComparedRun
 from svo.studies.comparison.tuning import Tuned
-from svo.studies.isolation.summary import Delays, Share
+from svo.studies.statistics import Delays, Share
 
 
 @dataclass(frozen=True)

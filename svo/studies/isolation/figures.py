@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.summary import ConditionSummary
 from svo.studies.isolation.tables import architectures
+from svo.studies.page import Picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,15 +31,6 @@ STYLE: Any = {
     "savefig.facecolor": "white",
 }
 DPI = 150
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture that has been written, and what it shows."""
-
-    path: Path
-    title: str
-    caption: str
 
 
 def write_pictures(

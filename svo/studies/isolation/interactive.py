@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from html import escape
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from svo.plant import HEALTHY, Plant, fault_start
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.plots import colours, column_label, separating_states, time_window
 from svo.studies.isolation.run import RunRow
+from svo.studies.page import render
 
 _FRAMES = 160  # samples of a run that the page holds; more would only make it heavier
 _DIGITS = 6
 
 
-def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterable[Exemplar]) -> str:
+def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterable[Exemplar]) -> Markup:
     """HTML of both views with their data, for the script report.js; nothing is loaded from elsewhere.
 
     Parameters
@@ -31,32 +32,11 @@ def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterabl
     """
     flights = [_flight(plant, e) for e in exemplars if e.fault != HEALTHY]
     if not flights:
-        return ""
+        return Markup()
     data = {"plant": plant.name, "Ts": plant.Ts, "runs": [_run(row) for row in rows], "flights": flights}
     # "<" cannot end the script element from inside a string.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    options = "".join(f'<option value="{i}">{escape(flight["title"])}</option>' for i, flight in enumerate(flights))
-    return _SECTION.format(options=options, data=text)
-
-
-_SECTION = """<h2>Every run</h2>
-<p class="soft">One dot a run, left detection, right isolation. Point at a dot, touch it, or move with the arrow keys:
-its seed makes that very run.</p>
-<div class="scroll"><svg id="runs" role="group" tabindex="0" aria-describedby="run"
-aria-label="Delays of every run; left and right arrow choose a run"></svg></div>
-<p id="run" class="readout" aria-live="polite">&nbsp;</p>
-<h2>One run, step by step</h2>
-<p class="soft">Bounds of two states by each model alive, around the true state (cross). A model whose set becomes empty
-is falsified and disappears.</p>
-<p class="controls">
-<label>Run <select id="flight">{options}</select></label>
-<button id="play" type="button">Play</button>
-<label class="grow">Time <input id="time" type="range" min="0" value="0" step="1"></label>
-</p>
-<div class="scroll"><svg id="sets" role="img" aria-describedby="sample"
-aria-label="Bounds of two states by each model, and which models are alive when"></svg></div>
-<p id="sample" class="readout" aria-live="off">&nbsp;</p>
-<script id="data" type="application/json">{data}</script>"""
+    return render("interactive.html.j2", flights=flights, data=text)
 
 
 def _run(row: RunRow) -> dict[str, Any]:

@@ -11,7 +11,8 @@ import numpy as np
 from svo.logs.names import Column
 from svo.plant import HEALTHY, Reference
 from svo.studies.isolation.exemplar import Exemplar, Snapshot
-from svo.studies.isolation.summary import ConditionSummary, Delays
+from svo.studies.isolation.summary import ConditionSummary
+from svo.studies.statistics import Delays
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

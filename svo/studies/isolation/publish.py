@@ -5,11 +5,12 @@ from __future__ import annotations
 from svo.plant import Plant
 from svo.studies.added import AddsExhibits, added_failures, added_study, publish_added
 from svo.studies.configuration import StudyConfiguration
-from svo.studies.isolation.figures import Picture, write_pictures
+from svo.studies.isolation.figures import write_pictures
 from svo.studies.isolation.interactive import interactive_section
 from svo.studies.isolation.report import write_report
 from svo.studies.isolation.store import StudyFolder
 from svo.studies.isolation.summary import ConditionSummary, summarise, write_summary
+from svo.studies.page import Picture
 from svo.studies.runs import failures, finished_runs
 
 

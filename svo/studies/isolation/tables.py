@@ -4,28 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from svo.plant import HEALTHY, Plant
-from svo.studies.isolation.summary import ConditionSummary, Delays, Share
-
-if TYPE_CHECKING:
-    from rich.table import Table
+from svo.studies.isolation.summary import ConditionSummary
+from svo.studies.statistics import Delays, Share
+from svo.studies.tables import TextTable
 
 NO_MEAN, NOT_WITHIN_RUN = "–", "∞"
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A table of text; the first ``labels`` columns are names, the others figures."""
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    labels: int
 
 
 def delay_table(plant: Plant, summaries: Sequence[ConditionSummary]) -> TextTable:
@@ -94,21 +81,6 @@ def total(shares: Iterable[Share]) -> Share:
     """Several shares taken together."""
     every = list(shares)
     return Share(sum(s.count for s in every), sum(s.of for s in every))
-
-
-def to_rich(table: TextTable) -> Table:
-    """The table for a terminal."""
-    from rich import box
-    from rich.table import Table
-
-    rich_table = Table(
-        title=table.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0)
-    )
-    for i, name in enumerate(table.header):
-        rich_table.add_column(name, justify="left" if i < table.labels else "right", no_wrap=True)
-    for row in table.rows:
-        rich_table.add_row(*row)
-    return rich_table
 
 
 def _delay_row(plant: Plant, summary: ConditionSummary, with_architecture: bool) -> tuple[str, ...]:

@@ -10,7 +10,8 @@ import numpy as np
 
 from svo.plant import HEALTHY
 from svo.store import file_name
-from svo.studies.isolation.figures import STYLE, Picture, save_picture
+from svo.studies.isolation.figures import STYLE, save_picture
+from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary
 

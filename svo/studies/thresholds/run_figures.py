@@ -10,8 +10,9 @@ import numpy as np
 from svo.indices import judge_alarm
 from svo.interval.detector import IntervalRecord
 from svo.plant import HEALTHY, fault_start, first_faulty_sample
-from svo.studies.isolation.figures import STYLE, Picture, save_picture
+from svo.studies.isolation.figures import STYLE, save_picture
 from svo.studies.isolation.plots import in_seconds
+from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 
 if TYPE_CHECKING:

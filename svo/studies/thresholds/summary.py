@@ -9,7 +9,7 @@ from pathlib import Path
 
 from svo.plant import HEALTHY, fault_start
 from svo.store import write_csv
-from svo.studies.isolation.summary import Delays, Share
+from svo.studies.statistics import Delays, Share
 from svo.studies.thresholds.run import DetectorRow, LearnsDetectors
 
 _HEADER = (

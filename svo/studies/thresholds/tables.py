@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from svo.plant import HEALTHY
-from svo.studies.isolation.summary import Share
-from svo.studies.isolation.tables import TextTable
+from svo.studies.statistics import Share
+from svo.studies.tables import TextTable
 from svo.studies.thresholds.run import LearnsDetectors
 from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary
 

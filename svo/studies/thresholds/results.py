@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Any
 
 from svo.plant import HEALTHY
-from svo.studies.isolation.figures import Picture
-from svo.studies.isolation.report import html_facts, html_figure, html_table, write_page
-from svo.studies.isolation.summary import Share
-from svo.studies.isolation.tables import TextTable
+from svo.studies.page import Picture, Report, study_command, write_page
 from svo.studies.runs import failures, finished_runs
+from svo.studies.statistics import Share
 from svo.studies.store import StudyStore
+from svo.studies.tables import TextTable
 from svo.studies.thresholds import tables
 from svo.studies.thresholds.figures import write_pictures
 from svo.studies.thresholds.run import LEARNING_RECORDS, LearnsDetectors
@@ -105,33 +103,18 @@ def _write_report(
     path: Path, plant: LearnsDetectors, identity: Mapping[str, Any], study: DetectionStudy, pictures: Sequence[Picture]
 ) -> None:
     configuration = identity["configuration"]
-    runs = f"{configuration['runs']} runs of each scenario, seed {configuration['seed']}"
-    noise = " ".join(f"--noise {name}" for name in configuration["noise"])
-    faults = "".join(f" --fault {name}" for name in configuration["faults"])
-    every = configuration["faults"] == [HEALTHY, *plant.faults]
-    command = (
-        f"svo study {plant.name} --runs {configuration['runs']} --seed {configuration['seed']} {noise}"
-        f"{'' if every else faults} --out DIR"
+    report = Report(
+        f"{configuration['runs']} runs of each scenario, seed {configuration['seed']}",
+        study.findings,
+        study.tables,
+        f"Paper: {plant.reference_title}.",
+        pictures,
+        _GLOSSARY,
+        study_command(plant, configuration),
+        configuration,
+        identity["versions"],
     )
-    parts = [
-        f"<h1>Study of interval detectors: {escape(plant.title)}</h1>",
-        f'<p class="soft">{escape(runs)}</p>',
-        "<h2>What came out</h2>",
-        '<ul class="findings">' + "".join(f"<li>{escape(line)}.</li>" for line in study.findings) + "</ul>",
-        *(html_table(table) for table in study.tables),
-        f'<p class="soft">Paper: {escape(plant.reference_title)}.</p>',
-        "<h2>Pictures</h2>",
-        *(html_figure(picture) for picture in pictures),
-        "<h2>What is counted</h2>",
-        "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in _GLOSSARY.items()) + "</dl>",
-        "<h2>How to make it again</h2>",
-        f"<p><code>{escape(command)}</code></p>",
-        "<p>The table of runs is in <code>runs.parquet</code>, the statistics in <code>summary.csv</code>. "
-        "<code>svo simulate</code> with a run's seed makes that run's log.</p>",
-        html_facts("Configuration", configuration),
-        html_facts("Versions", identity["versions"]),
-    ]
-    write_page(path, f"Study of interval detectors: {plant.title}", parts)
+    write_page(path, f"Study of interval detectors: {plant.title}", report=report)
 
 
 def _plain(s: DetectorSummary) -> dict[str, Any]:
