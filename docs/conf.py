@@ -20,6 +20,7 @@ import svo.baselines
 import svo.faults
 import svo.interval
 import svo.residual_tests
+import svo.testing
 
 project = "svo-fdi"
 author = "The svo-fdi developers"
@@ -89,7 +90,7 @@ def _load_public_names() -> None:
 
 def _check_public_names(_app: Any, env: Any) -> None:
     """A public name that no page of the reference describes is an error."""
-    for package in (polytopes, svo, svo.baselines, svo.faults, svo.interval, svo.residual_tests):
+    for package in (polytopes, svo, svo.baselines, svo.faults, svo.interval, svo.residual_tests, svo.testing):
         for name in package.__all__:
             described = inspect.isroutine(value := getattr(package, name)) or inspect.isclass(value)  # no type alias
             if described and f"{package.__name__}.{name}" not in env.domaindata["py"]["objects"]:

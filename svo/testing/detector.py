@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.signatures import options_by_name
 from svo.detectors.detector import NOBODY, Detection, Detector, Setting
 from svo.logs.log import Log
 from svo.plant import HEALTHY, Plant
@@ -18,7 +19,8 @@ from svo.testing.rules import Conformance, NotApplicable, keep, rule, table
 SEARCHED = 1.1  # a critical level may be too high by less than this factor, where it is searched for
 
 
-def check_detector(detector: Detector, plant: Plant, noise: str | None = None) -> Conformance:
+@options_by_name
+def check_detector(detector: Detector, plant: Plant, *, noise: str | None = None) -> Conformance:
     """Ask every rule of `DETECTOR_RULES` of a detector.
 
     Parameters

@@ -27,14 +27,20 @@ COARSE = Fraction(1, 10**6)  # of a set's width: for rules that are about anothe
 
 
 class Kind:
-    """What makes observers, and the models that it refused with the reason."""
+    """A kind of observer, and the models that it refused with the reason.
+
+    Parameters
+    ----------
+    make : callable
+        As `check_observer` takes it.
+    """
 
     def __init__(self, make: Make) -> None:
         self._make = make
         self.refused: dict[str, str] = {}
 
     def observer(self, system: System = PLAIN) -> Any:
-        """A fresh one.
+        """A fresh one for a ``system``.
 
         Raises
         ------
@@ -50,7 +56,7 @@ class Kind:
             raise NotApplicable(f"the observer refuses a model with {system.name}: {error}") from error
 
     def taken(self, systems: Collection[System]) -> list[System]:
-        """Those that it does not refuse."""
+        """The ``systems`` that it does not refuse."""
         found = []
         for system in systems:
             try:
@@ -61,14 +67,14 @@ class Kind:
         return found
 
     def that_can(self, capability: str) -> Any:
-        """A fresh observer that declares a capability."""
+        """A fresh observer that declares a ``capability``, such as "takes_late"."""
         observer = self.observer()
         if not getattr(observer, capability, False):
             raise NotApplicable(f"the observer does not declare {capability}")
         return observer
 
     def answers(self, log: Log, system: System = PLAIN) -> list[Answer]:
-        """Those of a fresh observer over a log."""
+        """Those of a fresh observer for a ``system`` over a ``log``."""
         return answers_of(self.observer(system), log)
 
 

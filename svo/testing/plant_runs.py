@@ -33,7 +33,12 @@ class Scenario:
 
 
 class PlantRuns:
-    """A plant and its runs, each simulated once."""
+    """The runs of a plant, each simulated once.
+
+    Parameters
+    ----------
+    plant : Plant or MonitoredPlant
+    """
 
     def __init__(self, plant: MonitoredPlant) -> None:
         self.monitored = plant
@@ -59,21 +64,23 @@ class PlantRuns:
         return [Scenario(fault, p, noise) for fault, profiles in self.plant.faults.items() for p in profiles]
 
     def log(self, scenario: Scenario) -> Log:
+        """The run of a ``scenario`` with the seed of the rules."""
         if scenario not in self._logs:
             self._logs[scenario] = self.simulate(scenario, SEED)
         return self._logs[scenario]
 
     def simulate(self, scenario: Scenario, seed: int | np.random.SeedSequence) -> Log:
+        """A fresh run of a ``scenario`` with a ``seed``."""
         return self.plant.simulate(scenario.fault, scenario.profile, scenario.noise, seed)
 
     def model(self, noise: str) -> UncertainModel:
-        """Of the bank's nominal observer."""
+        """Of the nominal observer of the bank for a ``noise`` set."""
         if noise not in self._models:
             self._models[noise] = nominal_model(self.monitored.bank(noise))
         return self._models[noise]
 
     def first_faulty(self, scenario: Scenario) -> int:
-        """Number of the first faulty sample; that after the last one without a fault."""
+        """Number of the first faulty sample of a ``scenario``; that after the last one without a fault."""
         log = self.log(scenario)
         if scenario.fault == HEALTHY:
             return len(log)

@@ -11,7 +11,7 @@ Subject = TypeVar("Subject")
 
 
 class ConformanceError(AssertionError):
-    """A rule is broken.
+    """A ``rule`` is broken.
 
     Attributes
     ----------
@@ -50,7 +50,15 @@ class Rule(Generic[Subject]):
     breaches: Callable[[Subject], Iterator[str]]
 
     def check(self, subject: Subject) -> None:
-        """Raise ConformanceError at the first breach; whatever the subject raises is one."""
+        """Ask the rule of a subject: a `Kind` of observer, or the `PlantRuns` of a plant.
+
+        Raises
+        ------
+        ConformanceError
+            At the first breach; whatever else the subject raises is one.
+        NotApplicable
+            If the subject does not offer what the rule asks for.
+        """
         try:
             found = next(iter(self.breaches(subject)), None)
         except (NotApplicable, ConformanceError):
@@ -63,7 +71,15 @@ class Rule(Generic[Subject]):
 
 @dataclass(frozen=True)
 class Conformance:
-    """What a check asked: names of the rules that hold, and for each that could not be asked, why."""
+    """What a check asked.
+
+    Attributes
+    ----------
+    kept : tuple of str
+        Names of the rules that hold.
+    left_out : mapping of str to str
+        Why the others could not be asked.
+    """
 
     kept: tuple[str, ...]
     left_out: Mapping[str, str]

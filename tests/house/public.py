@@ -9,6 +9,7 @@ from typing import Any
 
 FACES = (
     "polytopes", "svo", "svo.plant", "svo.interval", "svo.faults", "svo.indices", "svo.residual_tests", "svo.baselines",
+    "svo.testing",
 )  # fmt: skip
 
 

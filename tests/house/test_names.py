@@ -10,7 +10,7 @@ from tests.house.imports import ROOT
 from tests.house.public import callables
 
 TYPES = {
-    "noise": r"str|NoiseCharacterization|Sequence\[str\]",
+    "noise": r"str( \| None)?|NoiseCharacterization|Sequence\[str\]",
     "n": r"int|float|Schedulable",
     "w": r"ArrayLike|Any|Schedulable",
     "Ts": r"float( \| None)?",
