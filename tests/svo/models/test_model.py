@@ -435,3 +435,8 @@ def test_directions_over_a_promised_range_are_bounded_outward() -> None:
         )
         assert Fraction(float(held.support(d)[0])) >= exact
     assert StateRange(np.array([-np.inf, 0.0]), np.array([1.0, np.inf])).support(np.eye(2)).tolist() == [1.0, np.inf]
+
+
+def test_a_matrix_after_C_has_to_be_named() -> None:
+    with pytest.raises(TypeError, match=r"UncertainModel takes A, B, C by position; .* D=\.\.\., E=\.\.\."):
+        UncertainModel([[0.5]], [[1.0]], [[1.0]], [[0.0]])  # type: ignore[call-arg]
