@@ -21,6 +21,7 @@ from typing import Any, Generic
 from svo.studies.attempt import Failed, Job, Outcome, attempt
 
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
+_LAST_SECONDS = 10.0
 
 
 def outcomes_in_processes(
@@ -89,6 +90,7 @@ class _Worker(Generic[Job]):
 
     def answer(self) -> Any:
         """What the process says, or why it says nothing any more."""
+        overdue = monotonic() >= self.until
         self.is_busy, self.until = False, float("inf")
         with suppress(EOFError, OSError):
             if self.connection.poll():
@@ -96,7 +98,8 @@ class _Worker(Generic[Job]):
                 self.is_ready = True
                 return said
         self.is_alive = False
-        too_long = self.process.exitcode is None and not wait([self.process.sentinel], 0)
+        if not overdue:
+            self.process.join(_LAST_SECONDS)  # its end of the connection closes a moment before it is gone
         self.end()
         if not self.is_ready:
             raise RuntimeError(
@@ -105,7 +108,7 @@ class _Worker(Generic[Job]):
             )
         return Failed(
             f"it took longer than the limit of {self.limit:g} s and was stopped"
-            if too_long
+            if overdue
             else f"its process {_ended(self.process.exitcode)}"
         )
 

@@ -4,33 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 from svo.plant import Plant, load_plant
 from svo.studies.added import added_failures, added_study, run_added
 from svo.studies.configuration import Job, StudyConfiguration
 from svo.studies.engine import Place, Progress, complete, within
 from svo.studies.store import StudyStore
-
-
-class Identified(Protocol):
-    """What rows of all run tables say of their run."""
-
-    @property
-    def run(self) -> int: ...
-    @property
-    def seed(self) -> int: ...
-    @property
-    def fault(self) -> str: ...
-    @property
-    def profile(self) -> str: ...
-    @property
-    def noise(self) -> str: ...
-    @property
-    def error(self) -> str | None: ...
-
-
-AnyRow = TypeVar("AnyRow", bound=Identified)
 
 
 @cache
@@ -64,7 +44,7 @@ def run_into(
             run_added(added, folder.path, place, retry_failed=retry_failed, progress=told(len(jobs)))
 
 
-def failures(rows: Sequence[Identified]) -> list[str]:
+def failures(rows: Sequence[Any]) -> list[str]:
     """A line for each run that failed: which one, and why."""
     return [
         f"run {row.run} (fault {row.fault}, profile {row.profile}, noise {row.noise}, seed {row.seed}) failed: "
@@ -80,7 +60,7 @@ def all_failures(folder: StudyStore[Any], plant: Plant) -> list[str]:
     return failures(folder.rows()) + (added_failures(added, folder.path) if added else [])
 
 
-def finished_runs(rows: Sequence[AnyRow]) -> list[AnyRow]:
+def finished_runs(rows: Sequence[Any]) -> list[Any]:
     """The rows of runs that did not fail.
 
     Raises

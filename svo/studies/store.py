@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol, Self
+from typing import Any, ClassVar, Generic
 
 from svo.store import Identity, Joined, Parts, Survey, digest_of, locked, versions, write_whole
 from svo.store.lock import check_free
@@ -24,26 +24,16 @@ ALARMS, SAMPLES = "alarms", "exemplar"  # what belongs to a run beside its rows
 _SHOWN = 5
 
 
-class RunRow(Protocol):
-    """A row of a run table, whose dataclass is the table's schema."""
-
-    @property
-    def error(self) -> str | None:
-        """Why the run failed; None if it did not."""
-        ...
-
-    @classmethod
-    def failed(cls, job: Job, error: str) -> Self:
-        """The only row of a run that failed."""
-        ...
-
-
 Written = Mapping[str, Callable[[Path], Any]]
 
 
 @dataclass(frozen=True)
 class StudyStore(Generic[Row]):
-    """Where a study keeps its files; a subclass names the dataclass of its rows."""
+    """Where a study keeps its files.
+
+    A subclass names the dataclass of its rows, whose ``error`` says why a run failed and is None otherwise; its class
+    method ``failed(job, error)`` makes the only row of such a run.
+    """
 
     path: Path
     row: ClassVar[type[Any]]

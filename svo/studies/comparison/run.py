@@ -102,7 +102,7 @@ def compare_run(detector: Detector, setting: Setting, log: Log, condition: Condi
     return ComparedRun(
         *identity,
         first_alarm_s=judge_alarm(alarmed, first, Ts).delay,
-        delay_s=_finite(found.delay) if found.delay > 0 else None,
+        delay_s=judge_alarm(_last_switch(detection.alarm), first, Ts).delay,
         false_alarm=found.false_alarm,
         false_detection_rate=_finite(found.false_detection_rate),
         non_detection_rate=found.non_detection_rate,
@@ -121,6 +121,11 @@ def _begins_from(said: NDArray[np.intp], first_faulty: int) -> int | None:
     begins = (said != NOBODY) & (said != np.append(NOBODY, said[:-1]))
     begins[:first_faulty] = False
     return first_true(begins)
+
+
+def _last_switch(alarm: NDArray[np.bool_]) -> int | None:
+    """The sample at which an alarm (K,) that stands at the end began; None if none stands there."""
+    return int(np.flatnonzero(np.append(True, ~alarm))[-1]) if alarm[-1] else None
 
 
 def _finite(value: float) -> float | None:

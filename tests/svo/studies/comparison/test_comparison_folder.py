@@ -122,3 +122,11 @@ def test_what_fails_is_a_row_and_can_be_tried_again(tmp_path, monkeypatch):
     assert len(resumed.failures()) == 8
     again = run_comparison(FEW, out=tmp_path, resume=True, retry_failed=True)
     assert list(map(untimed, again.rows)) == list(map(untimed, whole.rows))
+
+
+def test_a_cluster_gives_the_same_rows():
+    distributed = pytest.importorskip("distributed", reason="needs the extra 'cluster'")
+    size = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**size, processes=False) as cluster:
+        spread = run_comparison(FEW, scheduler=cluster.scheduler_address)
+    assert list(map(untimed, spread.rows)) == list(map(untimed, run_comparison(FEW).rows))
