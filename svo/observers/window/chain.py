@@ -170,19 +170,19 @@ class BoundProver:
 
     def arrival(self, window: Window, program: int) -> None:
         """The bound of the next arrival set that a program has just given."""
-        w, i, lower = window.memory.arrays, program // 2, program % 2 == 1
+        arrays, i, lower = window.memory.arrays, program // 2, program % 2 == 1
         target = window.memory.base + window.memory.size.block
-        bound = exact(-w["new_lower"][i] if lower else w["new_upper"][i])
-        proven = _proven(window, program, target, -w["T"][i] if lower else w["T"][i])
+        bound = exact(-arrays["new_lower"][i] if lower else arrays["new_upper"][i])
+        proven = _proven(window, program, target, -arrays["T"][i] if lower else arrays["T"][i])
         what = f"arrival bound {program} of sample {target + window.origin}"
         self._count(proven is not None and proven <= bound, what)
 
     def channel(self, window: Window, q: int, side: int, is_open: bool) -> None:
         """s = f'(x, u, 1, w) <= s_upper, or -s <= -s_lower, by the program's multipliers or by none at all."""
-        memory, w, size = window.memory, window.memory.arrays, window.memory.size
+        memory, arrays, size = window.memory, window.memory.arrays, window.memory.size
         v, time = memory.variables, memory.time
-        f = (1.0 - 2.0 * side) * w["functional"][v, q]
-        bound, known = exact(w["s_upper"][v, q] if side == 0 else -w["s_lower"][v, q]), _known_part(memory, f)
+        f = (1.0 - 2.0 * side) * arrays["functional"][v, q]
+        bound, known = exact(arrays["s_upper"][v, q] if side == 0 else -arrays["s_lower"][v, q]), _known_part(memory, f)
         bases = [4 * size.nt + 2 * q + side, None] if is_open else [None]
         proofs = [_proven(window, basis, time, f[: size.n]) for basis in bases]
         holds = any(proof is not None and proof + known <= bound for proof in proofs)
@@ -197,11 +197,11 @@ class BoundProver:
 
 def _known_part(memory: Memory, f: Array) -> fmpq:
     """Largest value of what u, the constant and w of the newest sample contribute to f'(x, u, 1, w)."""
-    w, n, nu, v = memory.arrays, memory.size.n, memory.size.nu, memory.variables
+    arrays, n, nu, v = memory.arrays, memory.size.n, memory.size.nu, memory.variables
     total = exact(f[n + nu])
-    for value, u in zip(f[n : n + nu], w["u"][memory.slot], strict=True):
+    for value, u in zip(f[n : n + nu], arrays["u"][memory.slot], strict=True):
         total += exact(value) * exact(u)
-    for value, low, high in zip(f[n + nu + 1 :], w["w_lower"][v], w["w_upper"][v], strict=True):
+    for value, low, high in zip(f[n + nu + 1 :], arrays["w_lower"][v], arrays["w_upper"][v], strict=True):
         total += exact(value) * exact(high if value > 0 else low)
     return total
 
@@ -212,10 +212,10 @@ def _proven(window: Window, basis: int | None, sample: int, direction: Array) ->
     They are those of the program solved last, whose basis is given; None: without any. The sample is one of the
     window, as the kernel counts.
     """
-    w = window.memory.arrays
-    w["farkas"][:] = 0.0
+    arrays = window.memory.arrays
+    arrays["farkas"][:] = 0.0
     if basis is not None:
-        k = int(w["k"][basis])
-        w["farkas"][w["rows"][basis, :k]] = w["nu"][:k]
+        k = int(arrays["k"][basis])
+        arrays["farkas"][arrays["rows"][basis, :k]] = arrays["nu"][:k]
     found = window.certificate((sample, direction))
     return found.proven_bound(sample + window.origin, direction / window.settings.form.x)

@@ -58,7 +58,7 @@ class WindowSettings:
         return channel_owners(self.form.model)
 
     @cached_property
-    def late(self) -> bool:
+    def output_is_disturbed(self) -> bool:
         """Whether w and channels enter the output, so that they take part at their own sample."""
         return output_is_disturbed(self.form.model)
 
@@ -92,18 +92,18 @@ class Memory:
         self.size = kernel.Sizes(
             n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=nq, nh=len(w_rows[0]), nt=n + len(template), na=na,
             ni=1 + len(model.uncertainties), N=steps, block=settings.block, K=min(rows, columns, largest) + 2,
-            late=int(settings.late),
+            late=int(settings.output_is_disturbed),
         )  # fmt: skip
-        w = self.arrays = _room_for(self.size)
-        w["T"][:n] = np.eye(n)
-        w["T"][n:] = template
-        w["owner"][:] = owner
-        w["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in owner]).reshape(-1, 2)
-        w["w_rows"][:, : model.n_disturbances], w["w_rows_lower"][:], w["w_rows_upper"][:] = w_rows
-        w["jitter"][:] = jitter(w["jitter"].size)
-        self.kernel = kernel.new_window(dict(w))
+        arrays = self.arrays = _room_for(self.size)
+        arrays["T"][:n] = np.eye(n)
+        arrays["T"][n:] = template
+        arrays["owner"][:] = owner
+        arrays["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in owner]).reshape(-1, 2)
+        arrays["w_rows"][:, : model.n_disturbances], arrays["w_rows_lower"][:], arrays["w_rows_upper"][:] = w_rows
+        arrays["jitter"][:] = jitter(arrays["jitter"].size)
+        self.kernel = kernel.new_window(dict(arrays))
         if injection is not None:
-            w |= injection.allocate(self.size)
+            arrays |= injection.allocate(self.size)
 
     @property
     def time(self) -> int:

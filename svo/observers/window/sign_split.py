@@ -144,12 +144,12 @@ class SplitPrograms:
     """
 
     def __init__(self, memory: Memory, certificate: Callable[[], WindowCertificate], limit: int) -> None:
-        self._w, self._window, self._size = memory.arrays, memory.kernel, memory.size
+        self._arrays, self._window, self._size = memory.arrays, memory.kernel, memory.size
         self._certificate, self._limit = certificate, limit
         self._open = dict(self._open_channels())
-        self._saved = {name: self._w[name].copy() for name in _CHANGED}
+        self._saved = {name: self._arrays[name].copy() for name in _CHANGED}
         slots = [k % (self._size.N + self._size.late) for k in range(memory.base, memory.time + 1)]
-        self._bounds = self._w["s_lower"][slots].copy(), self._w["s_upper"][slots].copy()
+        self._bounds = self._arrays["s_lower"][slots].copy(), self._arrays["s_upper"][slots].copy()
 
     @property
     def is_needed(self) -> bool:
@@ -178,7 +178,7 @@ class SplitPrograms:
                 low, high = self._open[k, q]
                 waiting = [cell | {(k, q): (low, 0.0)}, cell | {(k, q): (0.0, high)}]
         self._apply({})
-        self._w["seen_base"][:] = -1
+        self._arrays["seen_base"][:] = -1
         if heap:
             return SplitResult(-heap[0][0], has_point, None)
         return SplitResult(-np.inf, False, SplitCertificate(tuple(proofs), *self._bounds))
@@ -187,26 +187,26 @@ class SplitPrograms:
         self, task: int, program: int, cell: Cell, bound: Callable[[], float]
     ) -> tuple[int, float, tuple[int, int] | None]:
         self._apply(cell)
-        self._w["seen_base"][:] = -1  # the bases are those of other rows
+        self._arrays["seen_base"][:] = -1  # the bases are those of other rows
         verdict, _ = kernel.solve(self._window, self._size, task, program, program + 1, kernel.PIVOT_LIMIT)
         branch = self._most_violated(cell) if verdict == kernel.CONSISTENT else self._widest(cell)
         return verdict, bound(), branch
 
     def _apply(self, cell: Cell) -> None:
         for name, array in self._saved.items():
-            self._w[name][...] = array
+            self._arrays[name][...] = array
         for (k, q), (low, high) in cell.items():
             kernel.redraw_channel(self._window, self._size, k, q, low, high)
 
     def _open_channels(self) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
-        w, size = self._w, self._size
+        arrays, size = self._arrays, self._size
         nr = size.ny + size.nh + 2 * size.nq
-        for k in range(int(w["clock"][kernel.BASE]), int(w["clock"][kernel.TIME]) + size.late):
+        for k in range(int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME]) + size.late):
             v = k % (size.N + size.late)
-            rows = w["scale"][size.na + (k % (size.N + 1)) * nr + size.ny + size.nh :]
+            rows = arrays["scale"][size.na + (k % (size.N + 1)) * nr + size.ny + size.nh :]
             for q in range(size.nq):
-                low, high = float(w["s_lower"][v, q]), float(w["s_upper"][v, q])
-                if low < 0.0 < high and rows[2 * q] != 0.0 and w["delta"][q, 0] < w["delta"][q, 1]:
+                low, high = float(arrays["s_lower"][v, q]), float(arrays["s_upper"][v, q])
+                if low < 0.0 < high and rows[2 * q] != 0.0 and arrays["delta"][q, 0] < arrays["delta"][q, 1]:
                     yield (k, q), (low, high)
 
     def _widest(self, cell: Cell) -> tuple[int, int] | None:
@@ -216,20 +216,20 @@ class SplitPrograms:
 
     def _most_violated(self, cell: Cell) -> tuple[int, int] | None:
         """The open channel whose p at the maximiser misses every Delta s the most; None if none does."""
-        w, size = self._w, self._size
-        n, nw, nv, z = size.n, size.nw, size.nw + size.nq, self._w["z"]
-        x, worst, found = w["xc"] + w["xr"] * z[:n], _INEXACT, None
-        for k in range(int(w["clock"][kernel.BASE]), int(w["clock"][kernel.TIME]) + 1):
+        arrays, size = self._arrays, self._size
+        n, nw, nv, z = size.n, size.nw, size.nw + size.nq, self._arrays["z"]
+        x, worst, found = arrays["xc"] + arrays["xr"] * z[:n], _INEXACT, None
+        for k in range(int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME]) + 1):
             s, v = k % (size.N + 1), k % (size.N + size.late)
             own = z[n + v * nv : n + (v + 1) * nv]
-            values = w["vc"][v] + w["vr"][v] * own
+            values = arrays["vc"][v] + arrays["vr"][v] * own
             for q in range(size.nq):
                 if (k, q) in self._open and (k, q) not in cell:
-                    value = float(w["functional"][v, q] @ np.concatenate([x, w["u"][s], [1.0], values[:nw]]))
-                    low, high = sorted(d * value for d in w["delta"][q])
-                    p, width = float(values[nw + q]), float(w["vr"][v, nw + q])
+                    value = float(arrays["functional"][v, q] @ np.concatenate([x, arrays["u"][s], [1.0], values[:nw]]))
+                    low, high = sorted(d * value for d in arrays["delta"][q])
+                    p, width = float(values[nw + q]), float(arrays["vr"][v, nw + q])
                     miss = max(low - p, p - high) / width if width > 0.0 else 0.0
                     if miss > worst:
                         worst, found = miss, (k, q)
-            x = w["A"][s] @ x + w["drift"][s] + w["inputs"][s] @ own
+            x = arrays["A"][s] @ x + arrays["drift"][s] + arrays["inputs"][s] @ own
         return found

@@ -81,8 +81,8 @@ class Window:
         self.settings, self.anchor, self.origin, self.free, self.prover = settings, anchor, origin, free, prover
         self._model, self._injection = settings.form.model, settings.injection
         self.memory = Memory(settings, len(anchor.rows), settings.first_steps if steps is None else steps)
-        n, w = self._model.n_states, self.memory.arrays
-        w["h_lower"][:n], w["h_upper"][:n] = anchor.box_lower, anchor.box_upper
+        n, arrays = self._model.n_states, self.memory.arrays
+        arrays["h_lower"][:n], arrays["h_upper"][:n] = anchor.box_lower, anchor.box_upper
         kernel.initialise(self.memory.kernel, self.memory.size, anchor.rows, anchor.lower, anchor.upper)
         self.proof: WindowCertificate | SplitCertificate | None = None
         self.reason: str | None = None
@@ -133,8 +133,8 @@ class Window:
         own, memory, self.reason = sample - self.origin, self.memory, None
         kernel.add_late(memory.kernel, memory.size, own, y, self.settings.eps)
         if self._injection is not None:  # the sample was incomplete, so it is as it was given
-            s, w = own % (memory.size.N + 1), memory.arrays
-            w["given.y"][s], w["given.slack"][s] = w["y"][s], w["slack"][s]
+            s, arrays = own % (memory.size.N + 1), memory.arrays
+            arrays["given.y"][s], arrays["given.slack"][s] = arrays["y"][s], arrays["slack"][s]
         return self._cut_arrival(self._decide(None))
 
     def read_at(self, sample: int) -> Array:
@@ -155,8 +155,8 @@ class Window:
 
     def blur(self, stack: Array) -> Array:
         """The slack of each row of the newest sample that comes from the width of the set."""
-        w, s, n = self.memory.arrays, self.memory.slot, self._model.n_states
-        width = w["mag"][s] - np.abs(w["phi"][s])
+        arrays, s, n = self.memory.arrays, self.memory.slot, self._model.n_states
+        width = arrays["mag"][s] - np.abs(arrays["phi"][s])
         blur: Array = self.settings.eps * np.abs(stack[0, n:, :n]) @ np.maximum(width, 0.0)
         return blur
 
@@ -168,11 +168,11 @@ class Window:
         ``objective`` is a sample of the window, as the kernel counts, and a direction, in normal form, whose bound is
         to be proven.
         """
-        w, size = self.memory.arrays, self.memory.size
+        arrays, size = self.memory.arrays, self.memory.size
         if self._injection is not None:
-            found = self._injection.certificate(w, size, self._arrival(), objective)
+            found = self._injection.certificate(arrays, size, self._arrival(), objective)
         else:
-            found = certificate_of(w, size, self._arrival())
+            found = certificate_of(arrays, size, self._arrival())
         found = replace(found, first=found.first + self.origin, last=found.last + self.origin)
         out, beyond = window_out(found, self.settings.form), np.abs(found.samples[-1].y) == ENORMOUS
         if self._given is None or not beyond.any():
@@ -183,8 +183,8 @@ class Window:
     def _arrival(self) -> ArrivalSet:
         if self.memory.base == 0:
             return self.anchor
-        n, w = self._model.n_states, self.memory.arrays
-        lower, upper = w["h_lower"].copy(), w["h_upper"].copy()
+        n, arrays = self._model.n_states, self.memory.arrays
+        lower, upper = arrays["h_lower"].copy(), arrays["h_upper"].copy()
         return ArrivalSet(lower[:n], upper[:n], self.settings.template, lower[n:], upper[n:])
 
     def _prove(self) -> bool:
@@ -265,24 +265,24 @@ class Window:
     def _widen(self, sample: Sample) -> None:
         """Bounds of what the injection leaves to the state and to the box of w, by what is known of the state."""
         assert self._injection is not None
-        w, s, v, nw = self.memory.arrays, self.memory.slot, self.memory.variables, self._model.n_disturbances
+        arrays, s, v, nw = self.memory.arrays, self.memory.slot, self.memory.variables, self._model.n_disturbances
         bounds = sample.w_lower, sample.w_upper
         d, widening, slack = self._injection.widths(
-            sample.stack, sample.y, sample.u_next, w["mag"][s], bounds, self.settings.eps
+            sample.stack, sample.y, sample.u_next, arrays["mag"][s], bounds, self.settings.eps
         )
-        w["w_lower"][v, nw:], w["w_upper"][v, nw:] = -d, d
-        w["noise"][s] += widening
-        w["given.slack"][s] = slack
+        arrays["w_lower"][v, nw:], arrays["w_upper"][v, nw:] = -d, d
+        arrays["noise"][s] += widening
+        arrays["given.slack"][s] = slack
 
     def _settle_channels(self, sign_open: bool, reaching: bool, is_first: bool, end: float | None) -> None:
         """Tighten the bounds of those s whose sign is open, of the channels that reach the output or of the others."""
-        w, v = self.memory.arrays, self.memory.variables
+        arrays, v = self.memory.arrays, self.memory.variables
         if not sign_open and (self.prover is None or (is_first and not reaching)):
             return  # no transition leads to the first sample
-        gain = w["gain"][v][:, self._model.n_states :]
+        gain = arrays["gain"][v][:, self._model.n_states :]
         for q in np.flatnonzero(gain.any(axis=1) == reaching).tolist():
             for side in range(2):
-                is_open = sign_open and w["s_lower"][v, q] < 0.0 < w["s_upper"][v, q]
+                is_open = sign_open and arrays["s_lower"][v, q] < 0.0 < arrays["s_upper"][v, q]
                 if is_open:
                     self._solve_one(kernel.CHANNELS, 2 * q + side, end)
                 if self.prover is not None:
@@ -290,10 +290,12 @@ class Window:
 
     def _cut_arrival(self, verdict: VerdictName) -> VerdictName:
         """The next arrival set, once it is known, within the physical range."""
-        physical, w, n = self._model.physical_range, self.memory.arrays, self._model.n_states
-        if physical is None or not w["clock"][kernel.PENDING] or verdict == "falsified":
+        physical, arrays, n = self._model.physical_range, self.memory.arrays, self._model.n_states
+        if physical is None or not arrays["clock"][kernel.PENDING] or verdict == "falsified":
             return verdict
-        w["new_lower"][:n], w["new_upper"][:n], meets = physical.cut(w["new_lower"][:n], w["new_upper"][:n])
+        arrays["new_lower"][:n], arrays["new_upper"][:n], meets = physical.cut(
+            arrays["new_lower"][:n], arrays["new_upper"][:n]
+        )
         if meets:
             return verdict
         self.reason = OUTSIDE  # not proven, so no alarm
@@ -347,27 +349,24 @@ class Window:
 
     def _solve_one(self, task: int, program: int, end: float | None) -> int:
         """One program, its pivots in portions until it is decided or the time ``end`` is reached, if there is one."""
-        memory, verdict, late, done = self.memory, kernel.UNDECIDED, False, 0
-        while verdict == kernel.UNDECIDED and not late:
-            portion = kernel.PIVOT_LIMIT
-            if end is None:
-                late = True
-            else:
-                late = perf_counter() >= end or done >= kernel.PIVOT_LIMIT
-                portion = 0 if late else _PIVOTS_BETWEEN_LOOKS
+        memory, done = self.memory, 0
+        while True:
+            over = end is None or perf_counter() >= end or done >= kernel.PIVOT_LIMIT
+            portion = kernel.PIVOT_LIMIT if end is None else 0 if over else _PIVOTS_BETWEEN_LOOKS
             verdict, _ = kernel.solve(memory.kernel, memory.size, task, program, program + 1, portion)
+            if over or verdict != kernel.UNDECIDED:
+                return int(verdict)
             done += portion
-        return int(verdict)
 
     def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
         """As `solve`, each program over its cells."""
-        w, size = self.memory.arrays, self.memory.size
+        arrays, size = self.memory.arrays, self.memory.size
         programs = {kernel.NEWEST: range(2 * size.nt), kernel.QUERY: range(1)}.get(task) or self._arrival_programs()
         prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
         has_point = False
         for program in programs:
             sign = 1.0 - 2.0 * (program % 2)
-            target = w["answer"] if prefix is None else w[f"{prefix}_{'lower' if program % 2 else 'upper'}"]
+            target = arrays["answer"] if prefix is None else arrays[f"{prefix}_{'lower' if program % 2 else 'upper'}"]
             at = 0 if prefix is None else program // 2
             result = split.solve(task, program, lambda t=target, i=at, s=sign: float(s * t[i]))  # type: ignore[misc]
             has_point = has_point or result.has_point
@@ -379,11 +378,11 @@ class Window:
         return "consistent" if has_point else "undecided"
 
     def _ask_highs(self) -> VerdictName:
-        w = self.memory.arrays
-        feasible, ray = is_feasible(w["G"], w["lower"], w["upper"])
+        arrays = self.memory.arrays
+        feasible, ray = is_feasible(arrays["G"], arrays["lower"], arrays["upper"])
         if feasible is False:
             for multipliers in candidates(ray):
-                w["farkas"][:] = multipliers
+                arrays["farkas"][:] = multipliers
                 if self._prove():
                     return "falsified"
         return "consistent" if feasible else "undecided"
