@@ -138,11 +138,15 @@ def solve_programs(w, size, task, start, stop, limit):
         basis, count = 4 * size.nt + 2 * size.nq, 1
     bounds_arrival = time - base > size.N - size.block
     v = time % (size.N + size.late)
+    is_open = False
     for program in range(max(begin, start), min(stop, count)):
         i, side = program // 2, program % 2
         sign = 1.0 - 2.0 * side
-        if task == CHANNELS and not (w.s_lower[v, i] < 0.0 < w.s_upper[v, i]):
-            continue
+        if task == CHANNELS:
+            if side == 0 or program == start:  # both ends of an s that was open: its sign is a convention
+                is_open = w.s_lower[v, i] < 0.0 and (side == 1 or w.s_upper[v, i] > 0.0)
+            if not is_open:
+                continue
         if task == NEWEST:
             constant, rounding = _newest_cost(w, size, w.T[i], sign)
         elif task == QUERY:
