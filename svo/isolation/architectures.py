@@ -11,10 +11,11 @@ from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.isolation.bank import Bank, falsified_and_undecided, largest_at
 from svo.isolation.bank_checks import by_name, check_counts
-from svo.isolation.bank_state import Sample, set_arrays, set_of
+from svo.isolation.bank_state import Sample
 from svo.isolation.global_logic import GlobalLogic
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.observers.base import Observer, Step
+from svo.observers.saved_state import arrays_of, read_arrays
 
 Box = tuple[Array, Array]
 
@@ -191,10 +192,11 @@ class ArchitectureII(Bank):
         self._largest_at: int | None = None  # what the global set rests on
 
     def _memory(self) -> dict[str, Array]:
-        return set_arrays("global", self._global_set) | _sample_array(self._largest_at)
+        known = {} if self._global_set is None else arrays_of("global", self._global_set)
+        return known | _sample_array(self._largest_at)
 
     def _recall(self, arrays: Mapping[str, Array]) -> None:
-        self._global_set = set_of("global", arrays)
+        self._global_set = read_arrays(HPolytope, "global", arrays) if "global.A" in arrays else None
         self._largest_at = _sample_of(arrays)
 
     def _begin_again(

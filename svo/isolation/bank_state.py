@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes import HPolytope
 from svo.checks import real_array
 from svo.isolation.logic import LogicState, Tally
 from svo.models.digest import canonical
@@ -22,7 +21,6 @@ from svo.observers.base import Observer
 from svo.observers.saved_state import digest_of_arrays
 
 State = dict[str, NDArray[Any]]
-_SET = ("A", "b", "C", "d")
 _CONCLUSIONS, _SEAL = "bank.conclusions", "bank.seal"
 
 
@@ -131,16 +129,6 @@ def restored(name: str, observer: Observer, state: State) -> Observer:
     if canonical(again.options) != canonical(observer.options):
         raise ValueError(f"observer {name!r} has other options than this bank's")
     return again
-
-
-def set_arrays(name: str, P: HPolytope | None) -> State:
-    """A set, or none, as named arrays."""
-    return {} if P is None else {f"{name}.{part}": getattr(P, part) for part in _SET}
-
-
-def set_of(name: str, state: Mapping[str, NDArray[Any]]) -> HPolytope | None:
-    """What `set_arrays` named."""
-    return HPolytope(*(state[f"{name}.{part}"] for part in _SET)) if f"{name}.A" in state else None
 
 
 def _digest(state: Mapping[str, NDArray[Any]]) -> str:

@@ -9,16 +9,20 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes import HPolytope
 from svo.models.digest import ModelSample, Options, model_digest
 from svo.models.model import UncertainModel
 
+Value = TypeVar("Value")
 State = Mapping[str, NDArray[Any]]
 MODEL, WHOLE, SCHEDULE = "seal.model", "seal.state", "seal.schedule"
+_SET = ("A", "b", "C", "d")
 
 
 def sealed(state: State, model: UncertainModel, options: Options, schedule: Any) -> dict[str, NDArray[Any]]:
@@ -56,6 +60,18 @@ def check_model(state: State, model: UncertainModel, options: Options) -> None:
             "it is the state of another model or of other options; expected the very numbers that the observer was "
             "made with: matrices, bounds, sampling time, horizon"
         )
+
+
+def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
+    """Copies of the arrays of a polytope, or of a dataclass of arrays, under its name."""
+    parts = _SET if isinstance(value, HPolytope) else [f.name for f in fields(value)]
+    return {f"{name}.{part}": getattr(value, part).copy() for part in parts}
+
+
+def read_arrays(kind: type[Value], name: str, state: State) -> Value:
+    """What `arrays_of` gave of a value of this type."""
+    parts = _SET if kind is HPolytope else [f.name for f in fields(kind)]  # type: ignore[arg-type]
+    return kind(*(np.array(state[f"{name}.{part}"]) for part in parts))
 
 
 def take_exactly(target: Mapping[str, NDArray[Any]], state: State) -> None:

@@ -35,15 +35,14 @@ from svo.observers.polytope.sets import Outcome, PublishedRecursion, Recursion, 
 from svo.observers.polytope.state import (
     read_outcome,
     read_sample,
-    read_set,
     write_outcome,
     write_sample,
-    write_set,
 )
 from svo.observers.polytope.step import PolytopeStep
 from svo.observers.polytope.vertex_images import transitions
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, TOO_LARGE
 from svo.observers.recursion import RecursiveObserver
+from svo.observers.saved_state import arrays_of, read_arrays
 from svo.observers.window_kernel import LARGEST
 
 _PUBLISHED_STACKS = 4096
@@ -174,7 +173,7 @@ class PolytopeObserver(RecursiveObserver[Sample]):
         state: dict[str, NDArray[Any]] = {"settings": np.array([self.horizon, facets, self.eps, published])}
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state["restart"] = np.array([self._number, largest, self._readings is not None])
-        state |= self._form.state_dict() | write_set("initial", self._initial)
+        state |= self._form.state_dict() | arrays_of("initial", self._initial)
         state |= self._saved_readings()
         if self._last is not None:
             sample, outcome = self._last
@@ -187,7 +186,7 @@ class PolytopeObserver(RecursiveObserver[Sample]):
         self._configure(NormalForm.from_state_dict(model, state), int(horizon), limit, eps, bool(published))
 
     def _resume(self, state: Mapping[str, NDArray[Any]]) -> PolytopeStep | None:
-        self._begin_from(read_set(state, "initial"))
+        self._begin_from(read_arrays(HPolytope, "initial", state))
         number, largest, lost = (int(v) for v in state["restart"])
         self._number, self.largest_at = number, None if largest == NO_SAMPLE else largest
         self._restore_readings(lost, state)

@@ -12,18 +12,10 @@ from polytopes import Certificate, HPolytope
 from svo.observers.answers import VerdictName
 from svo.observers.polytope.certificate import AnyCertificate, PolytopeCertificate, PublishedCertificate
 from svo.observers.polytope.sets import Outcome, Sample
+from svo.observers.saved_state import arrays_of, read_arrays
 
 State = dict[str, NDArray]
 VERDICTS: tuple[VerdictName, ...] = ("consistent", "falsified", "undecided")
-
-
-def write_set(name: str, P: HPolytope) -> State:
-    """The rows of a set."""
-    return {f"{name}.{part}": getattr(P, part).copy() for part in ("A", "b", "C", "d")}
-
-
-def read_set(state: Mapping[str, NDArray], name: str) -> HPolytope:
-    return HPolytope(*(np.array(state[f"{name}.{part}"]) for part in ("A", "b", "C", "d")))
 
 
 def write_sample(name: str, sample: Sample) -> State:
@@ -31,11 +23,11 @@ def write_sample(name: str, sample: Sample) -> State:
     state: State = {f"{name}.{part}": getattr(sample, part).copy() for part in ("stack", "noise", "u", "y")}
     state[f"{name}.number"] = np.array(sample.number)
     state[f"{name}.w_box"] = np.array(sample.w_box)
-    return state if sample.disturbances is None else state | write_set(f"{name}.w", sample.disturbances)
+    return state if sample.disturbances is None else state | arrays_of(f"{name}.w", sample.disturbances)
 
 
 def read_sample(state: Mapping[str, NDArray], name: str) -> Sample:
-    disturbances = read_set(state, f"{name}.w") if f"{name}.w.A" in state else None
+    disturbances = read_arrays(HPolytope, f"{name}.w", state) if f"{name}.w.A" in state else None
     stack, noise, u, y = (np.array(state[f"{name}.{part}"]) for part in ("stack", "noise", "u", "y"))
     w_lower, w_upper = np.array(state[f"{name}.w_box"])
     return Sample(int(state[f"{name}.number"]), stack, disturbances, noise, u, y, (w_lower, w_upper))
@@ -44,7 +36,7 @@ def read_sample(state: Mapping[str, NDArray], name: str) -> Sample:
 def write_outcome(name: str, outcome: Outcome) -> State:
     """An answer with all that it keeps for the next."""
     state: State = {f"{name}.verdict": np.array(VERDICTS.index(outcome.verdict))}
-    state |= write_set(f"{name}.joint", outcome.joint)
+    state |= arrays_of(f"{name}.joint", outcome.joint)
     state |= _write_groups(f"{name}.memory", outcome.memory)
     state[f"{name}.proofs"] = np.array([len(group) for group in outcome.proofs], dtype=np.int64)
     for i, group in enumerate(outcome.proofs):
@@ -61,7 +53,7 @@ def read_outcome(state: Mapping[str, NDArray], name: str) -> Outcome:
     return Outcome(
         verdict,
         certificate,
-        read_set(state, f"{name}.joint"),
+        read_arrays(HPolytope, f"{name}.joint", state),
         _read_groups(state, f"{name}.memory"),
         tuple(
             tuple(_read_proof(state, f"{name}.proofs.{i}.{j}") for j in range(count))
@@ -77,24 +69,29 @@ def _write_groups(name: str, groups: Iterable[Iterable[HPolytope]]) -> State:
         sets = tuple(group)
         counts.append(len(sets))
         for j, P in enumerate(sets):
-            state |= write_set(f"{name}.{i}.{j}", P)
+            state |= arrays_of(f"{name}.{i}.{j}", P)
     return state | {name: np.array(counts, dtype=np.int64)}
 
 
 def _read_groups(state: Mapping[str, NDArray], name: str) -> tuple[tuple[HPolytope, ...], ...]:
-    return tuple(tuple(read_set(state, f"{name}.{i}.{j}") for j in range(count)) for i, count in enumerate(state[name]))
+    return tuple(
+        tuple(read_arrays(HPolytope, f"{name}.{i}.{j}", state) for j in range(count))
+        for i, count in enumerate(state[name])
+    )
 
 
 def _write_proof(name: str, proof: PolytopeCertificate) -> State:
     state: State = {f"{name}.sample": np.array(proof.sample)}
     state[f"{name}.multipliers"] = np.array(json.dumps(proof.multipliers.to_dict()))
-    return state | write_set(f"{name}.rows", proof.measurement) | _write_groups(f"{name}.before", [proof.before])
+    return state | arrays_of(f"{name}.rows", proof.measurement) | _write_groups(f"{name}.before", [proof.before])
 
 
 def _read_proof(state: Mapping[str, NDArray], name: str) -> PolytopeCertificate:
     multipliers = Certificate.from_dict(json.loads(str(state[f"{name}.multipliers"])))
     (before,) = _read_groups(state, f"{name}.before")
-    return PolytopeCertificate(int(state[f"{name}.sample"]), before, read_set(state, f"{name}.rows"), multipliers)
+    return PolytopeCertificate(
+        int(state[f"{name}.sample"]), before, read_arrays(HPolytope, f"{name}.rows", state), multipliers
+    )
 
 
 def _write_certificate(name: str, certificate: AnyCertificate | None) -> State:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
+from svo.observers.saved_state import arrays_of, read_arrays
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.memory import WindowSettings
 from svo.observers.window.sample import Outgrown, Sample, check_matrices
@@ -232,7 +233,7 @@ class WindowObserver(Observer):
             "restart": np.array(numbers, dtype=np.int64),
             "missing": self._missing,
         }
-        state |= {f"initial.{f.name}": getattr(self._initial, f.name) for f in fields(ArrivalSet)}
+        state |= arrays_of("initial", self._initial)
         if self._readings is not None:
             state |= self._readings.state()
         return state | self._form.state_dict() | window.state()
@@ -244,10 +245,7 @@ class WindowObserver(Observer):
 
     def _resume(self, state: Mapping[str, NDArray[Any]]) -> WindowStep | None:
         origin, free, lost, lost_at, largest, has_readings = (int(v) for v in state["restart"])
-        self._initial, anchor = (
-            ArrivalSet(**{f.name: np.array(state[f"{name}.{f.name}"]) for f in fields(ArrivalSet)})
-            for name in ("initial", "anchor")
-        )
+        self._initial, anchor = (read_arrays(ArrivalSet, name, state) for name in ("initial", "anchor"))
         falsified = bool(state["falsified"])
         self._window = Window(self._settings, anchor, int(state["settings"][1]), origin, bool(free))
         self._window.resume(state, falsified)

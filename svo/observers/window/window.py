@@ -7,7 +7,7 @@ keeps. All in normal form.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from time import perf_counter
 from typing import Protocol
 
@@ -20,7 +20,7 @@ from svo.observers import window_kernel as kernel
 from svo.observers.answers import VerdictName
 from svo.observers.given_units import window_out
 from svo.observers.readings import OUTSIDE
-from svo.observers.saved_state import take_exactly
+from svo.observers.saved_state import arrays_of, take_exactly
 from svo.observers.window.certificate import WindowCertificate, certificate_of
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.fallback import candidates, is_feasible
@@ -203,9 +203,8 @@ class Window:
 
     def state(self) -> dict[str, NDArray]:
         """Everything but settings and prover, as named arrays."""
-        anchor = {f"anchor.{f.name}": getattr(self.anchor, f.name) for f in fields(ArrivalSet)}
         before = dict(zip(("w_old_lower", "w_old_upper"), self._w_before or (), strict=False))
-        return anchor | before | self.memory.arrays
+        return arrays_of("anchor", self.anchor) | before | self.memory.arrays
 
     def resume(self, state: Mapping[str, NDArray], falsified: bool) -> None:
         """Take back the memory that `state` gave; ValueError unless it is one, and its falsification proven again."""

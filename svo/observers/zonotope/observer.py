@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.readings import NO_SAMPLE, OUTGROWN
 from svo.observers.recursion import RecursiveObserver
+from svo.observers.saved_state import arrays_of, read_arrays
 from svo.observers.window.evidence import WindowSample
 from svo.observers.window.setup import arrival_of, needs_next_input
 from svo.observers.window_kernel import LARGEST
@@ -127,10 +128,10 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
         settings = [self._number, falsified, self.max_generators, self.max_constraints, self.eps]
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
         state = {"settings": np.array(settings), "restart": np.array([largest, self._readings is not None])}
-        state |= _named("first", self._first) | self._form.state_dict()
+        state |= arrays_of("first", self._first) | self._form.state_dict()
         state |= self._saved_readings()
         for i, stage in enumerate(self._stages):
-            state |= _named(f"{i}.arrival", stage.arrival)
+            state |= arrays_of(f"{i}.arrival", stage.arrival)
             state |= {f"{i}.{name}": getattr(stage.data, name).copy() for name in _SAMPLE}
         return state
 
@@ -140,7 +141,7 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
 
     def _resume(self, state: Mapping[str, NDArray[Any]]) -> ZonotopeStep | None:
         """The stages are made again from their arrival sets and data, as they were made first."""
-        self._begin_from(_read(state, "first"))
+        self._begin_from(read_arrays(ConstrainedZonotope, "first", state))
         number, falsified, *_ = (float(v) for v in state["settings"])
         largest, lost = (int(v) for v in state["restart"])
         self._number, self.largest_at = int(number), None if largest == NO_SAMPLE else largest
@@ -150,7 +151,7 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
             values = {name: np.array(state[f"{i}.{name}"]) for name in _SAMPLE}
             bounds = values["w_lower"], values["w_upper"], values["noise"]
             data = self._builder.data(values["stack"], bounds, values["u"], values["y"])
-            arrival = _read(state, f"{i}.arrival")
+            arrival = read_arrays(ConstrainedZonotope, f"{i}.arrival", state)
             if i:
                 before, arrival = self._builder.predicted(stages[-1], stages[-1].data.u)
                 stages[-1] = before
@@ -230,11 +231,3 @@ def _limit(name: str, value: int | None, default: int, least: int) -> int:
     if not is_count(value, least):
         raise ValueError(f"{name} is {value!r}; expected an integer of at least {least}, or None for {default}")
     return int(value)
-
-
-def _named(prefix: str, Z: ConstrainedZonotope) -> dict[str, Array]:
-    return {f"{prefix}.{f.name}": getattr(Z, f.name).copy() for f in fields(Z)}
-
-
-def _read(state: Mapping[str, Array], prefix: str) -> ConstrainedZonotope:
-    return ConstrainedZonotope(**{f.name: np.array(state[f"{prefix}.{f.name}"]) for f in fields(ConstrainedZonotope)})
