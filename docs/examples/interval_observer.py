@@ -45,7 +45,7 @@ def times(a: Interval, b: Interval) -> Interval:
 
 
 def dot(row: Sequence[Interval], values: Sequence[Interval]) -> Interval:
-    return total([times(a, b) for a, b in zip(row, values, strict=True)])
+    return total([times(a, b) for a, b in zip(row, values, strict=True) if any(a)])
 
 
 def outward(intervals: Sequence[Interval]) -> tuple[Array, Array]:

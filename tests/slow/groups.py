@@ -26,7 +26,7 @@ FOLDERS = {
     "observers": ("tests/svo/observers", "tests/svo/isolation"),
     "plants": ("tests/aircraft", "tests/benchmarks"),
     "statistics": ("tests/svo/residual_tests", "tests/svo/interval", "tests/svo/baselines"),
-    "svo": ("tests/svo",),
+    "svo": ("tests/svo", "tests/testing"),
 }
 """Groups of tests by folder; a file belongs to the first that holds it."""
 

@@ -15,6 +15,7 @@ from svo import ConstrainedZonotopeObserver, PolytopeObserver, UncertainModel, W
 from svo.testing import OBSERVER_RULES, ConformanceError, Kind, check_observer
 from tests.testing.broken.first_breach import broken_rules
 from tests.testing.broken.observers import BROKEN_OBSERVERS, AlarmWithoutProof
+from tests.testing.broken.subclasses import broken_subclasses
 
 ROOT = Path(__file__).parents[2]
 OWN = (WindowObserver, PolytopeObserver, ConstrainedZonotopeObserver)
@@ -58,6 +59,20 @@ def test_a_broken_observer_is_caught_by_its_own_rule(broken: Any) -> None:
     own, found = BROKEN_OBSERVERS[broken], broken_rules(OBSERVER_RULES, Kind(broken))
     assert found[0] == own
     assert set(found) <= {own} | FOLLOWS.get(own, set())
+
+
+SUBCLASSES = [
+    pytest.param(broken, rule, marks=() if kind is WindowObserver else pytest.mark.slow)
+    for kind in OWN
+    for broken, rule in broken_subclasses(kind).items()
+]
+
+
+@pytest.mark.parametrize(("broken", "rule"), SUBCLASSES)
+def test_an_observer_that_a_subclass_breaks_is_caught(broken: Any, rule: str) -> None:
+    with pytest.raises(ConformanceError) as caught:
+        check_observer(broken)
+    assert caught.value.rule == rule
 
 
 def test_the_error_says_which_rule_what_was_seen_and_what_to_do() -> None:

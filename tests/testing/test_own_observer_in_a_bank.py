@@ -14,7 +14,6 @@ from polytopes import HPolytope
 from svo import ArchitectureI
 from svo.detection.detect import detect
 from svo.isolation.alarms import KINDS, verify_alarms, write_alarms
-from svo.testing import check_plant
 
 
 class TankWithIntervals(HeatedTank):
@@ -45,7 +44,3 @@ def test_a_certificate_that_holds_anything_else_proves_nothing() -> None:
     assert proof.verify()
     for wrong in ({"lower": proof.upper + 1.0}, {"lower": proof.lower[:1]}, {"upper": proof.upper * np.nan}):
         assert not replace(proof, **wrong).verify()
-
-
-def test_its_plant_keeps_every_rule() -> None:
-    assert not check_plant(TankWithIntervals()).left_out
