@@ -53,11 +53,12 @@ def run_added(
         )  # fmt: skip
 
 
-def publish_added(added: AddedStudy, folder: Path) -> None:
-    """Write the tables of what is done so far into the folder of the study."""
+def publish_added(added: AddedStudy, folder: Path) -> list[str]:
+    """Write the tables of what is done so far into the folder of the study; as `added_failures`."""
     finished = [row for row in _rows(added, folder).values() if row.error is None]
     if finished:
         added.write(folder, finished)
+    return added_failures(added, folder)
 
 
 def added_failures(added: AddedStudy, folder: Path) -> list[str]:

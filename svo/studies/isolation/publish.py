@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from svo.plant import Plant
-from svo.studies.added import AddsExhibits, added_failures, added_study, publish_added
+from svo.studies.added import AddsExhibits, added_study, publish_added
 from svo.studies.configuration import StudyConfiguration
 from svo.studies.isolation.figures import write_pictures
 from svo.studies.isolation.interactive import interactive_section
@@ -29,8 +29,7 @@ def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) ->
     pictures, failed = write_pictures(folder.path, plant, summaries, exemplars), failures(every)
     asked = StudyConfiguration.from_dict(folder.identity()["configuration"])
     if added := added_study(plant, asked):
-        publish_added(added, folder.path)
-        failed += added_failures(added, folder.path)
+        failed += publish_added(added, folder.path)
     if isinstance(plant, AddsExhibits):
         shown = plant.exhibits(folder.path, asked.runs, asked.seed, asked.noise)
         pictures += [Picture(exhibit.path, exhibit.title, exhibit.caption) for exhibit in shown]

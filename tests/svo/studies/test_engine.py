@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from svo.studies.attempt import Failed
+from svo.studies.attempt import Failed, attempt
 from svo.studies.engine import Place, complete
 
 HERE = Path(__file__).parent
@@ -67,6 +67,32 @@ def test_what_fails_in_a_process_costs_itself_alone() -> None:
 def test_what_fails_in_this_process_is_an_outcome_too() -> None:
     assert dict(Place().outcomes(work, ["raise", 0])) == {"raise": Failed("ValueError: no"), 0: os.getpid()}
     assert dict(Place(8).outcomes(work, [])) == {}
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (GeneratorExit("gone"), "GeneratorExit: gone"),
+        (OSError("/data/\udcff"), "OSError: /data/\\udcff"),
+        (ValueError("x" * 10**6), "ValueError: " + "x" * 2000),
+    ],
+)
+def test_whatever_an_error_says_can_be_stored(error: BaseException, words: str) -> None:
+    def fail() -> None:
+        raise error
+
+    assert attempt(fail) == Failed(words)
+
+
+def test_an_error_that_cannot_be_read_is_one() -> None:
+    class Mute(Exception):
+        def __str__(self) -> str:
+            raise RuntimeError
+
+    def fail() -> None:
+        raise Mute
+
+    assert attempt(fail) == Failed("Mute: (what it says cannot be read)")
 
 
 def test_an_interruption_is_no_failure_and_leaves_no_process() -> None:
