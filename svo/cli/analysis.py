@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +20,7 @@ from svo.cli.frame import (
     tell_failures,
 )
 from svo.cli.options import (
+    CORES,
     AsJson,
     FaultSize,
     FlightSeed,
@@ -29,6 +29,7 @@ from svo.cli.options import (
     PlantName,
     RetryFailed,
     Scheduler,
+    Workers,
     finite,
     own_processes,
 )
@@ -127,8 +128,7 @@ def compare(
     ],
     runs: Annotated[int, typer.Option(min=1, help="Judged runs of each fault, profile and noise.")] = 50,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the comparison; the same seed gives the same runs.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
-    or 1,
+    workers: Workers = CORES,
     noise: NoiseName = None,
     rate: Annotated[
         float,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,7 +19,17 @@ from svo.cli.frame import (
     plant_to_simulate,
     tell_failures,
 )
-from svo.cli.options import AsJson, Limit, NoiseName, PlantName, RetryFailed, Scheduler, own_processes
+from svo.cli.options import (
+    CORES,
+    AsJson,
+    Limit,
+    NoiseName,
+    PlantName,
+    RetryFailed,
+    Scheduler,
+    Workers,
+    own_processes,
+)
 from svo.cli.output import describe, print_detector_study, print_json, print_study
 
 _LIMIT = 3600.0  # s that a run may take, unless it is asked for
@@ -66,8 +75,7 @@ def study(
         int, typer.Option(min=1, help="Runs of each noise set, fault and profile, and without a fault.")
     ] = 10,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the study; the same seed gives the same runs.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")] = os.cpu_count()
-    or 1,
+    workers: Workers = CORES,
     noise: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Noise set; may be repeated. [default: the plant's first]")
     ] = None,
@@ -119,22 +127,17 @@ def study(
         for line in StudyFolder(out).check(configuration, resume):
             note(line)
         learns = isinstance(the_plant, LearnsDetectors)
-        run = run_detection_study if learns else run_study
+        run, show = (run_detection_study, _detector_study) if learns else (run_study, _isolation_study)
+        place: dict[str, Any] = {
+            "workers": workers,
+            "scheduler": scheduler,
+            "limit": own_processes(limit, scheduler, _LIMIT),
+        }
         announce(PREPARING)
         with progress("Runs") as update:
-            folder = run(
-                configuration,
-                out,
-                workers=workers,
-                scheduler=scheduler,
-                limit=own_processes(limit, scheduler, _LIMIT),
-                resume=resume,
-                retry_failed=retry_failed,
-                progress=update,
-            )
+            folder = run(configuration, out, resume=resume, retry_failed=retry_failed, progress=update, **place)
         announce("Writing summary, pictures and report")
-        shown = _detector_study if learns else _isolation_study
-        shown(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
+        show(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
         if not as_json:
             typer.echo(f"Report: {out / 'report.html'}")
         failed = all_failures(folder, the_plant)
