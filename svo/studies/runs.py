@@ -7,7 +7,7 @@ from functools import cache, partial
 from typing import Any
 
 from svo.plant import Plant, load_plant
-from svo.studies.added import added_failures, added_study, run_added
+from svo.studies.added import added_failures, added_study, publish_added, run_added
 from svo.studies.configuration import Job, StudyConfiguration
 from svo.studies.engine import Place, Progress, complete, within
 from svo.studies.store import StudyStore
@@ -58,6 +58,12 @@ def all_failures(folder: StudyStore[Any], plant: Plant) -> list[str]:
     """Those of a study and of what its plant adds to it."""
     added = added_study(plant, StudyConfiguration.from_dict(folder.identity()["configuration"]))
     return failures(folder.rows()) + (added_failures(added, folder.path) if added else [])
+
+
+def publish_beside(folder: StudyStore[Any], plant: Plant, rows: Sequence[Any]) -> list[str]:
+    """Write the tables of what a plant adds to a study of these rows; a line for each failure in both."""
+    added = added_study(plant, StudyConfiguration.from_dict(folder.identity()["configuration"]))
+    return failures(rows) + (publish_added(added, folder.path) if added else [])
 
 
 def finished_runs(rows: Sequence[Any]) -> list[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from svo.plant import Plant
-from svo.studies.added import AddsExhibits, added_study, publish_added
+from svo.studies.added import AddsExhibits
 from svo.studies.configuration import StudyConfiguration
 from svo.studies.isolation.figures import write_pictures
 from svo.studies.isolation.interactive import interactive_section
@@ -11,7 +11,7 @@ from svo.studies.isolation.report import write_report
 from svo.studies.isolation.store import StudyFolder
 from svo.studies.isolation.summary import ConditionSummary, summarise, write_summary
 from svo.studies.page import Picture
-from svo.studies.runs import failures, finished_runs
+from svo.studies.runs import finished_runs, publish_beside
 
 
 def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) -> list[ConditionSummary]:
@@ -26,11 +26,9 @@ def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) ->
     rows, exemplars = finished_runs(every), folder.exemplars(without_damaged)
     summaries = summarise(rows)
     write_summary(folder.path / "summary.csv", summaries)
-    pictures, failed = write_pictures(folder.path, plant, summaries, exemplars), failures(every)
-    asked = StudyConfiguration.from_dict(folder.identity()["configuration"])
-    if added := added_study(plant, asked):
-        failed += publish_added(added, folder.path)
+    pictures, failed = write_pictures(folder.path, plant, summaries, exemplars), publish_beside(folder, plant, every)
     if isinstance(plant, AddsExhibits):
+        asked = StudyConfiguration.from_dict(folder.identity()["configuration"])
         shown = plant.exhibits(folder.path, asked.runs, asked.seed, asked.noise)
         pictures += [Picture(exhibit.path, exhibit.title, exhibit.caption) for exhibit in shown]
     interactive = interactive_section(plant, rows, exemplars)

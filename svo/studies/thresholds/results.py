@@ -9,7 +9,7 @@ from typing import Any
 
 from svo.plant import HEALTHY
 from svo.studies.page import Picture, Report, study_command, write_page
-from svo.studies.runs import failures, finished_runs
+from svo.studies.runs import finished_runs, publish_beside
 from svo.studies.statistics import Share
 from svo.studies.store import StudyStore
 from svo.studies.tables import TextTable
@@ -79,7 +79,7 @@ def publish(folder: StudyStore[Any], plant: LearnsDetectors, without_damaged: bo
         summaries,
         assumption,
         [tables.detection_table(plant, group) for group in groups],
-        [*failures(every), *tables.assumption_lines(assumption), *_before_the_fault(summaries)],
+        [*publish_beside(folder, plant, every), *tables.assumption_lines(assumption), *_before_the_fault(summaries)],
     )
     _write_report(folder.path / "report.html", plant, folder.identity(), study, pictures)
     return study
