@@ -44,28 +44,41 @@ def explain(
     RuntimeError
         If neither shows that the log is explained.
     """
-    amounts = np.zeros(len(chosen))
-    lower, upper, _ = _bounds_along(form.given, log)
-    _give(amounts, chosen, "disturbance", lower, upper, trajectory.w * form.w)
-    deltas = np.array([q.bounds for q in form.given.uncertainties]).reshape(-1, 2)
-    _give(amounts, chosen, "Delta", deltas[:, 0], deltas[:, 1], trajectory.deltas)
-    kept = _kept(trajectory, form, log, widened(form.given, chosen, amounts), initial)
-    needed = needed_by(kept, form, log, initial)
-    size = needed.noise * form.y
-    _, _, noise = _bounds_along(form.given, log)
-    _give(amounts, chosen, "noise", -_with_rounding(noise, log.y), _with_rounding(noise, log.y), size)
-    model = widened(form.given, chosen, amounts)
-    relative = max(amounts / np.array([bound.scale for bound in chosen]), default=0.0)
+    scales = np.array([bound.scale for bound in chosen])
+    for least in (NEGLIGIBLE * scales, 0.0 * scales):  # what only the solver's tolerance asked for may be left out
+        found, proven = _widened(form, log, initial, chosen, trajectory, least)
+        if proven:
+            break
+    relative = max(found.amounts / scales, default=0.0)
     if 0.0 < relative <= NEGLIGIBLE and not _is_falsified(form.given, initial, log):
-        return Explanation(form.given, np.zeros(len(chosen)))  # only the solver's tolerance asked for more
-    explained = size <= _with_rounding(_bounds_along(model, log)[2], log.y)
-    proven = needed.is_within and bool((explained | np.isnan(size)).all()) and _are_disturbances(kept, form)
-    if not proven and _is_falsified(model, initial, log):
+        return Explanation(form.given, np.zeros(len(chosen)))
+    if not proven and _is_falsified(found.model, initial, log):
         raise RuntimeError(
             "the trajectory that was found could not be held in floats; widen the set of first states a little, or let "
             "bounds contain 'noise'"
         )
-    return Explanation(model, amounts)
+    return found
+
+
+def _widened(
+    form: NormalForm, log: Log, initial: HPolytope, chosen: Sequence[Bound], trajectory: Trajectory, least: Array
+) -> tuple[Explanation, bool]:
+    """The bounds of w and Delta widened where they need ``least`` (bounds,) or more, those of the noise as far as the
+    trajectory within them needs it; and whether it is proven to be one of that model."""
+    amounts = np.zeros(len(chosen))
+    lower, upper, noise = _bounds_along(form.given, log)
+    _give(amounts, chosen, "disturbance", lower, upper, trajectory.w * form.w)
+    deltas = np.array([q.bounds for q in form.given.uncertainties]).reshape(-1, 2)
+    _give(amounts, chosen, "Delta", deltas[:, 0], deltas[:, 1], trajectory.deltas)
+    amounts[amounts < least] = 0.0
+    kept = _kept(trajectory, form, log, widened(form.given, chosen, amounts), initial)
+    needed = needed_by(kept, form, log, initial)
+    size = needed.noise * form.y
+    _give(amounts, chosen, "noise", -_with_rounding(noise, log.y), _with_rounding(noise, log.y), size)
+    model = widened(form.given, chosen, amounts)
+    explained = size <= _with_rounding(_bounds_along(model, log)[2], log.y)
+    proven = needed.is_within and bool((explained | np.isnan(size)).all()) and _are_disturbances(kept, form)
+    return Explanation(model, amounts), proven
 
 
 def _is_falsified(model: UncertainModel, initial: HPolytope, log: Log) -> bool:
