@@ -18,7 +18,7 @@ from tests.testing.broken.plants import BROKEN_PLANTS, TooShort
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("name", ["eclipse", "elevator", "missile"])
+@pytest.mark.parametrize("name", ["eclipse", "elevator", pytest.param("missile", marks=pytest.mark.slow)])
 def test_the_registered_plants_keep_every_rule(name: str) -> None:
     assert check_plant(load_plant(name)).kept == tuple(PLANT_RULES)
 

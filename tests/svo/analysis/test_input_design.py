@@ -200,6 +200,7 @@ def test_the_command_isolates_a_small_loss_of_the_elevator(tmp_path: Path) -> No
     assert (np.abs(written["elevator_deg"]) <= 25.0).all()
 
 
+@pytest.mark.slow
 def test_no_input_of_the_eclipse_shows_the_dynamics_fault() -> None:
     # The input enters plant and observer alike and M_u u hardly depends on the airspeed: docs/errata.md.
     options = ["--fault", "dynamics", "--horizon", "3", "--hold", "3", "--noise", "conservative"]

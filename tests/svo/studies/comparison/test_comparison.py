@@ -141,6 +141,7 @@ def test_a_plant_without_detectors_is_refused(monkeypatch):
     module.compared_plant.cache_clear()
 
 
+@pytest.mark.slow
 def test_the_rows_do_not_depend_on_the_number_of_workers(registered):
     few = {"runs": 2, "healthy_training": 3, "healthy_calibration": 3, "healthy_runs": 2, "faulty_training": 1}
     small = Comparison("small", "usual", **few, evaluations=2)
