@@ -122,13 +122,15 @@ def width_after(driven: Any, samples: int, rng: np.random.Generator) -> tuple[fl
     return float(ratios[0]), float(ratios[1]), outside, verdicts
 
 
-def through_gaps(samples: int, folder: Path | None) -> Table:
-    """Every case through a gap."""
+def through_gaps(samples: int, folder: Path | None, words: str = "") -> Table:
+    """Every case whose name has these words through a gap."""
     table = Table(title=f"{samples} samples without a measurement, then 10 + n with")
     columns = ("observer", "CPU us a sample", "in the gap", "to no gap", "to all since", "outside", "undecided after")
     for column in columns:
         table.add_column(column, justify="left" if column == "observer" else "right")
     for number, (name, driven) in enumerate(cases().items()):
+        if words not in name:
+            continue
         driven.warm_up()
         path = None if folder is None else folder / f"{number}.{samples}.npz"
         driven, seconds = blind(driven, samples, path)
@@ -193,13 +195,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--samples", type=int, default=20_000, help="of the gap (20000)")
     parser.add_argument("--plants", type=int, default=50, help="random plants (50)")
+    parser.add_argument("--only", default="", help="observers whose name has these words, such as bank (all)")
     parser.add_argument("--state", type=Path, help="folder to save each stage in, and to go on from")
     options = parser.parse_args()
     if options.state is not None:
         options.state.mkdir(parents=True, exist_ok=True)
     console = Console(width=140)
     console.print(random_plants(options.plants))
-    console.print(through_gaps(options.samples, options.state))
+    console.print(through_gaps(options.samples, options.state, options.only))
 
 
 if __name__ == "__main__":
