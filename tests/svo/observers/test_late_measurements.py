@@ -15,7 +15,7 @@ from svo import UncertainModel, Uncertainty, WindowObserver
 from svo.logs.log import Log
 from svo.observers.window.chain import LateMeasurement, prove_chain
 from tests.svo.observers.random_plants import random_plant
-from tests.svo.observers.window_system import judge
+from tests.svo.observers.window.window_system import judge
 
 BOX = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
 

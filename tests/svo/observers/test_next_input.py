@@ -23,7 +23,7 @@ from svo import (
 )
 from svo.faults import ActuatorFault, SensorFault, Step, pairs
 from svo.logs.log import Log
-from tests.svo.observers.window_system import judge
+from tests.svo.observers.window.window_system import judge
 
 OBSERVERS = [WindowObserver, ConstrainedZonotopeObserver, PolytopeObserver]
 X0 = HPolytope.box([-1.0], [1.0])

@@ -18,8 +18,8 @@ from svo.observers.polytope.observer import PolytopeObserver
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import WindowSample
 from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
-from tests.svo.observers.falsified_windows import corrupted, varied_plant
 from tests.svo.observers.other_units import Units
+from tests.svo.observers.window.falsified_windows import corrupted, varied_plant
 
 seeds = st.integers(0, 2**32 - 1)
 

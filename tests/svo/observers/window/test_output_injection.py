@@ -20,7 +20,7 @@ from svo.observers.window import memory
 from svo.observers.window.chain import prove_chain
 from svo.observers.window.output_injection import can_inject
 from tests.svo.observers import oracle
-from tests.svo.observers.window_system import judge
+from tests.svo.observers.window.window_system import judge
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(max_examples=15, deadline=None, derandomize=True)

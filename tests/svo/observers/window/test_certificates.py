@@ -15,7 +15,7 @@ from svo.models.model import UncertainModel, Uncertainty
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.left_out import factors_of
 from svo.observers.window.observer import WindowObserver
-from tests.svo.observers.falsified_windows import (
+from tests.svo.observers.window.falsified_windows import (
     arrays_of,
     certificate_of_jump,
     drift,
@@ -24,7 +24,7 @@ from tests.svo.observers.falsified_windows import (
     sample_changed,
     seeds,
 )
-from tests.svo.observers.window_system import judge
+from tests.svo.observers.window.window_system import judge
 
 
 @settings(max_examples=60, deadline=None)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import ArrivalSet, WindowSample
-from tests.svo.observers.falsified_windows import (
+from tests.svo.observers.window.falsified_windows import (
     Forgery,
     arrays_of,
     certificate_of_jump,
@@ -24,7 +24,7 @@ from tests.svo.observers.falsified_windows import (
     seeds,
     some_certificates,
 )
-from tests.svo.observers.window_system import judge
+from tests.svo.observers.window.window_system import judge
 
 
 def test_the_random_plants_cover_what_a_model_can_hold() -> None:

@@ -21,7 +21,7 @@ from svo.logs.log import Log
 from svo.observers.window.sign_split import SplitCertificate
 from tests.svo.observers import oracle
 from tests.svo.observers.random_plants import random_plant
-from tests.svo.observers.test_against_full_information import (
+from tests.svo.observers.window.test_against_full_information import (
     Case,
     answers,
     assert_contains,
@@ -29,7 +29,7 @@ from tests.svo.observers.test_against_full_information import (
     open_channel,
     random_case,
 )
-from tests.svo.observers.window_system import judge
+from tests.svo.observers.window.window_system import judge
 
 seeds = st.integers(0, 2**32 - 1)
 SAMPLES, ENOUGH = 4, 10_000
