@@ -13,6 +13,8 @@ from polytopes.signatures import options_by_name
 from svo.checks import Array
 from svo.residual_tests.interface import WindowTest, check_count, check_finite
 
+_BLOCK = 4096  # windows whose sums are in memory at a time
+
 
 @options_by_name
 @dataclass(frozen=True, kw_only=True)
@@ -84,8 +86,11 @@ class RandomizedSubsampling(WindowTest):
         return np.asarray(bits.sum(axis=2) % 2 == 1)
 
     def _statistics(self, windows: Array) -> Array:
-        signs = self._signs(windows)
-        return -np.minimum((signs >= 0).sum(axis=1), (signs <= 0).sum(axis=1)).astype(float)
+        counts = np.empty(len(windows))
+        for first in range(0, len(windows), _BLOCK):
+            signs = self._signs(windows[first : first + _BLOCK])
+            counts[first : first + _BLOCK] = np.minimum((signs >= 0).sum(axis=1), (signs <= 0).sum(axis=1))
+        return -counts
 
     def _signs(self, windows: Array) -> Array:
         """Signs (m, M - 1) of the sums over the subsets, exact: a sum of quantised residuals is often zero."""
