@@ -21,6 +21,7 @@ from svo.logs.log import Log
 from svo.models.digest import model_digest
 from svo.observers.base import Certificate, Observer
 from svo.plant import MonitoredPlant, architecture_of, schedule_of
+from svo.plant.protocol import expect_plant
 from svo.store import write_text, write_whole
 
 
@@ -95,10 +96,7 @@ class Detection:
 
 def check_log(plant: MonitoredPlant, log: Log) -> None:
     """Raise an error if a log is not one of a plant: its channels, and its sampling time within 1 %."""
-    if isinstance(plant, str | Path):
-        raise TypeError(
-            f"plant is {str(plant)!r}; expected a plant, such as svo.plant.description.find_plant({str(plant)!r}) gives"
-        )
+    expect_plant(plant)
     if not isinstance(log, Log):
         raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.logs.file.read_log gives")
     if len(log) == 0:

@@ -45,7 +45,7 @@ def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> lis
         raise ValueError(
             f"{source} has no column {', '.join(repr(name) for name in missing)}; "
             f"expected the columns {', '.join(needed)}, found {', '.join(map(str, present))}"
-            + _meant(missing[0], [str(name) for name in present if name not in needed])
+            + _meant(missing[0], columns, [str(name) for name in present if name not in needed])
         )
     states = [c.name for c in columns.states]
     wanted = needed + (states if all(name in present for name in states) else [])
@@ -55,11 +55,14 @@ def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> lis
     return wanted
 
 
-def _meant(missing: str, others: Sequence[str]) -> str:
-    """The column that may stand there under another spelling, or with its unit."""
+def _meant(missing: str, columns: Columns, others: Sequence[str]) -> str:
+    """The column that may stand there under another spelling, or in another unit."""
+    unit = next((c.unit for c in columns.inputs + columns.outputs if c.name == missing), "s")
     bare = {name.partition("[")[0].partition("(")[0].strip().lower(): name for name in others}
     close = get_close_matches(missing.lower(), bare, n=1)
-    return f". Is {bare[close[0]]!r} meant? Then rename it to {missing!r}" if close else ""
+    if not close:
+        return ""
+    return f". Is {bare[close[0]]!r} meant? Then rename it to {missing!r}, with numbers in {unit or 'its unit'}"
 
 
 def may_be_missing(columns: Columns) -> frozenset[str]:

@@ -264,3 +264,14 @@ def first_faulty_sample(plant: Plant, fault: str, profile: str, time: NDArray[np
     if fault == HEALTHY:
         return len(time)
     return round((fault_start(plant, fault, profile) - float(time[0])) / plant.Ts)
+
+
+def expect_plant(plant: Any) -> None:
+    """Raise a TypeError for what is no plant, such as its name or its class."""
+    if not isinstance(plant, type) and callable(getattr(plant, "bank", None)):
+        return
+    if isinstance(plant, str | Path):
+        raise TypeError(
+            f"plant is {str(plant)!r}; expected a plant, such as svo.plant.description.find_plant({str(plant)!r}) gives"
+        )
+    raise TypeError(f"plant is {type(plant).__name__}; expected a plant (svo.plant.Plant), which has a bank(noise)")

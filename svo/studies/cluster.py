@@ -123,6 +123,7 @@ def _need_distributed() -> None:
 
 def _connected(scheduler: str) -> Client:
     from distributed import Client, Security
+    from distributed.comm import parse_address, parse_host_port
 
     if scheduler.startswith("tls:") and Security().get_connection_args("client").get("ssl_context") is None:
         raise ValueError(
@@ -130,6 +131,9 @@ def _connected(scheduler: str) -> Client:
             "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and the others of docs/studies.md, 'On a cluster'"
         )
     try:
+        scheme, place = parse_address(scheduler)
+        if scheme in ("tcp", "tls"):
+            parse_host_port(place)  # a client that fails on it prints tracebacks when it is collected
         return Client(scheduler, timeout=_CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ValueError(

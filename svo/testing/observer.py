@@ -45,6 +45,8 @@ def check_observer(make: Make) -> Conformance:
 
     Raises
     ------
+    TypeError
+        If ``make`` cannot be called.
     ConformanceError
         (an AssertionError) at the first broken rule; it names the rule, what was seen and what to do.
 
@@ -54,6 +56,10 @@ def check_observer(make: Make) -> Conformance:
     fractions: readings and bounds are short binary numbers and every unknown is at an end of its interval, so a bound
     that is rounded inward by the last bit is seen. Sets may be wider than need be; how wide is no rule.
     """
+    if not callable(make):
+        raise TypeError(
+            f"make is {type(make).__name__}; expected a class of observers, or a function of (model, initial)"
+        )
     kind = Kind(make)
     found = keep(OBSERVER_RULES.values(), kind)
     refused = {f"models with {name}": reason for name, reason in kind.refused.items()}

@@ -10,6 +10,7 @@ import numpy as np
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.plant import HEALTHY, MonitoredPlant, schedule_of
+from svo.plant.protocol import expect_plant
 from svo.testing.plant_runs import SEED, PlantRuns, Scenario, around, cut, misfit, nominal_model
 from svo.testing.rules import Conformance, keep, rule, table
 
@@ -33,6 +34,8 @@ def check_plant(plant: MonitoredPlant) -> Conformance:
 
     Raises
     ------
+    TypeError
+        If it is none, but its name or its class.
     ConformanceError
         (an AssertionError) at the first broken rule; it names the rule, what was seen and what to do.
 
@@ -41,6 +44,7 @@ def check_plant(plant: MonitoredPlant) -> Conformance:
     Seeds are fixed. Every fault and profile is simulated once, and its observer driven over the first 400 samples of
     the fault; healthy runs of every noise set are looked at whole, the bank's answers over 100 samples.
     """
+    expect_plant(plant)
     return keep(PLANT_RULES.values(), PlantRuns(plant))
 
 

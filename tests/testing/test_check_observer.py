@@ -144,3 +144,8 @@ def test_the_page_lists_every_rule() -> None:
     page = (ROOT / "docs" / "write_an_observer.md").read_text(encoding="utf-8")
     rows = [f"| {rule.name} | {rule.says} | {rule.advice} |" for rule in OBSERVER_RULES.values()]
     assert "\n".join(rows) in page
+
+
+def test_what_cannot_be_called_makes_no_observer() -> None:
+    with pytest.raises(TypeError, match="make is int; expected a class of observers, or a function"):
+        check_observer(3)  # type: ignore[arg-type]

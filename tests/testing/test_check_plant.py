@@ -58,3 +58,9 @@ def test_the_page_lists_every_rule() -> None:
     page = (ROOT / "docs" / "write_a_plant.md").read_text(encoding="utf-8")
     rows = [f"| {rule.name} | {rule.says} | {rule.advice} |" for rule in PLANT_RULES.values()]
     assert "\n".join(rows) in page
+
+
+@pytest.mark.parametrize(("wrong", "said"), [("tank", r"find_plant\('tank'\)"), (Tank, "which has"), (3, "is int")])
+def test_what_is_no_plant_is_a_type_error(wrong: Any, said: str) -> None:
+    with pytest.raises(TypeError, match=said):
+        check_plant(wrong)

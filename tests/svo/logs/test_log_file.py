@@ -86,7 +86,7 @@ def test_an_unknown_state_is_no_error(tmp_path: Path) -> None:
         ("", ["is empty"]),
         ("\n\n", ["is empty"]),
         (HEADER, ["no samples"]),
-        (GOOD.replace("gauge_1", "gauge1"), ["no column 'gauge_1'", "Is 'gauge1' meant? Then rename it to 'gauge_1'"]),
+        (GOOD.replace("gauge_1", "gauge1"), ["'gauge1' meant?", "'gauge_1', with numbers in m"]),
         (GOOD.replace("flow", "Flow [m3/s]"), ["no column 'flow'", "Is 'Flow [m3/s]' meant?"]),
         (GOOD.replace("flow", "voltage"), ["no column 'flow'", "found time_s, voltage, gauge_1, gauge_2, level"]),
         (GOOD.replace(",", ";"), ["no column 'time_s'", "time_s;flow", "split by semicolons; expected commas"]),

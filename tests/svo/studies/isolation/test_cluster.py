@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import os
 import signal
@@ -72,6 +73,16 @@ def test_an_address_without_a_scheduler_is_one_clear_error(
     wanted = StudyConfiguration.for_plant(load_plant(registered_tank), runs=1, seed=3)
     with pytest.raises(ValueError, match=r"no dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
         run_study(wanted, tmp_path, scheduler="tcp://127.0.0.1:9")
+
+
+def test_an_address_without_a_port_is_one_clear_error_and_nothing_more(
+    registered_tank: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    wanted = StudyConfiguration.for_plant(load_plant(registered_tank), runs=1, seed=3)
+    with pytest.raises(ValueError, match=r"no dask scheduler answers at 'nowhere'.*missing port"):
+        run_study(wanted, tmp_path, scheduler="nowhere")
+    gc.collect()
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_a_cluster_without_workers_is_one_clear_error(registered_tank: str, tmp_path: Path) -> None:
