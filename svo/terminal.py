@@ -74,11 +74,11 @@ class _Raw:
         self.stream = stream
 
     def write(self, text: str) -> int:
-        with _reader_of(self.stream):
+        with _reader_that_may_go():
             return self.stream.write(text)
 
     def flush(self) -> None:
-        with _reader_of(self.stream):
+        with _reader_that_may_go():
             self.stream.flush()
 
     def __getattr__(self, name: str) -> Any:
@@ -96,7 +96,7 @@ class _Plain(_Raw):
 
 
 @contextmanager
-def _reader_of(stream: TextIO) -> Iterator[None]:
+def _reader_that_may_go() -> Iterator[None]:
     try:
         yield
     except BrokenPipeError as error:

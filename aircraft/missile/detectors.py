@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -36,11 +37,9 @@ class Redundancy(ThresholdDetector):
     """
 
     airframe: Airframe
-    name: str = "control-induced redundancy"
-    faults: tuple[str, ...] = tuple(ACTUATORS.values())
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {"samples": Parameter(1, 40, integer=True, logarithmic=True)}
-    )
+    name = "control-induced redundancy"
+    faults = tuple(ACTUATORS.values())
+    parameters = MappingProxyType({"samples": Parameter(1, 40, integer=True, logarithmic=True)})
 
     def prepare(self, log: Log) -> Array:
         """Residuals (K, 12)."""

@@ -19,7 +19,7 @@ from svo.analysis.elastic_program import ElasticProgram, Explained
 from svo.analysis.explanation import NEGLIGIBLE, explain
 from svo.analysis.lifted_rows import bounding_box
 from svo.analysis.trajectory import Trajectory
-from svo.checks import Array
+from svo.checks import Array, is_count
 from svo.logs.log import Log
 from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm
@@ -121,7 +121,7 @@ def calibrate(
     RuntimeError
         If the solver leaves a program undecided, or the trajectory found cannot be proven one.
     """
-    if not isinstance(window, int | np.integer) or window < 2:
+    if not is_count(window, 2):
         raise ValueError(f"window is {window!r}; expected a number of samples >= 2")
     _check_log(model, log)
     form = NormalForm.at(model, *bounding_box("initial", initial, model.n_states))

@@ -23,7 +23,7 @@ from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.model_pair import LEAST_SEPARATION, ModelPair
-from svo.checks import Array, finite_array, is_finite_number, listed
+from svo.checks import Array, finite_array, is_count, is_finite_number, listed
 from svo.models.model import UncertainModel, expect_model
 
 _ROUNDS = 60
@@ -327,7 +327,7 @@ def _sets(given: HPolytope | Sequence[HPolytope] | None, initial: HPolytope, cou
 
 def _check_numbers(horizon: int, hold: int, margin: float) -> None:
     for name, value in (("horizon", horizon), ("hold", hold)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        if not is_count(value, 1):
             raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1")
     if not (is_finite_number(margin) and margin > LEAST_SEPARATION):
         raise ValueError(f"margin is {margin}; expected a separation above {LEAST_SEPARATION:g} noise widths")

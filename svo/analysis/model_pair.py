@@ -14,7 +14,7 @@ from polytopes import HPolytope
 from svo.analysis.lifted_rows import LiftedSample, bounding_box, evaluate_with_rest, line_rows, set_rows
 from svo.analysis.reachable_set import ReachableSet, product_bounds
 from svo.analysis.sparse_program import Columns, Solution, SparseProgram
-from svo.checks import Array, finite_array
+from svo.checks import Array, finite_array, is_count
 from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import Integers, NormalForm, exponents_of, set_in
 
@@ -67,7 +67,7 @@ class ModelPair:
     ) -> None:
         expect_model("plant_model", plant)
         expect_model("observer_model", observer)
-        if not isinstance(horizon, int | np.integer) or horizon < 1:
+        if not is_count(horizon, 1):
             raise ValueError(f"horizon is {horizon!r}; expected a number of samples >= 1")
         if (plant.n_inputs, plant.n_outputs) != (observer.n_inputs, observer.n_outputs):
             raise ValueError(

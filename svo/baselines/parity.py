@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from polytopes.signatures import options_by_name
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
+from svo.checks import is_count
 from svo.logs.log import Log
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ class ParitySpace:
     process_noise: float = 1.0
 
     def __post_init__(self) -> None:
-        if isinstance(self.order, bool) or not isinstance(self.order, int | np.integer) or self.order < 1:
+        if not is_count(self.order, 1):
             raise ValueError(f"order is {self.order!r}; expected a whole number of transitions >= 1")
         if self.degrees < 1:
             raise ValueError(f"order is {self.order}: (order + 1) ny is not above n; expected a longer window")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from svo.checks import Array
-from svo.detectors.detector import Detection, Parameter, Setting
+from svo.detectors.detector import Detection, Setting
 from svo.detectors.threshold import ThresholdDetector
 from svo.interval import IntervalPrediction, IntervalPredictor, NoiseCharacterization, first_order_filter
 from svo.logs.log import Log
@@ -34,7 +34,6 @@ class IntervalThreshold(ThresholdDetector):
     predictor: Callable[[float], IntervalPredictor]
     pole: float
     qbar: int
-    parameters: Mapping[str, Parameter] = field(default_factory=dict, init=False)
 
     @property
     def name(self) -> str:  # type: ignore[override]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -57,50 +58,41 @@ class ResidualTestDetector(ThresholdDetector):
         """Scores (K,) of one white residual of mean 0 and variance 1; NaN while there are none."""
 
 
-@dataclass(frozen=True)
 class StaticDetector(ResidualTestDetector):
     """Fixed thresholds."""
 
-    name: str = "static threshold"
-    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    name = "static threshold"
 
     def channel_scores(self, parameters: Mapping[str, float], white: Array) -> Array:
         return np.abs(white)
 
 
-@dataclass(frozen=True)
 class StudentDetector(ResidualTestDetector):
     """Student's test over a window."""
 
-    name: str = "Student"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {"samples": Parameter(3, 80, integer=True, logarithmic=True)}
-    )
+    name = "Student"
+    parameters = MappingProxyType({"samples": Parameter(3, 80, integer=True, logarithmic=True)})
 
     def channel_scores(self, parameters: Mapping[str, float], white: Array) -> Array:
         return StudentT(samples=int(parameters["samples"])).run(white).statistic
 
 
-@dataclass(frozen=True)
 class GLRDetector(ResidualTestDetector):
     """Generalised likelihood ratio over a window."""
 
-    name: str = "GLR"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {"samples": Parameter(1, 80, integer=True, logarithmic=True)}
-    )
+    name = "GLR"
+    parameters = MappingProxyType({"samples": Parameter(1, 80, integer=True, logarithmic=True)})
 
     def channel_scores(self, parameters: Mapping[str, float], white: Array) -> Array:
         return GLR(samples=int(parameters["samples"])).run(white).statistic
 
 
-@dataclass(frozen=True)
 class SPRTDetector(ResidualTestDetector):
     """Wald's test for a change to either side; the score is ln L since the last decision for H0."""
 
-    name: str = "SPRT"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {
+    name = "SPRT"
+    parameters = MappingProxyType(
+        {
             "change": Parameter(0.05, 4.0, logarithmic=True),
             "non_detection": Parameter(1e-4, 1e-1, logarithmic=True),
         }
@@ -121,20 +113,16 @@ def _since_healthy(increments: Array, lowest: float) -> Array:
     return scores
 
 
-@dataclass(frozen=True)
 class CUSUMDetector(ResidualTestDetector):
     """Two-sided cumulative sum."""
 
-    name: str = "CUSUM"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {"change": Parameter(0.05, 4.0, logarithmic=True)}
-    )
+    name = "CUSUM"
+    parameters = MappingProxyType({"change": Parameter(0.05, 4.0, logarithmic=True)})
 
     def channel_scores(self, parameters: Mapping[str, float], white: Array) -> Array:
         return CUSUM(change=parameters["change"]).run(white).statistic
 
 
-@dataclass(frozen=True)
 class SubsamplingDetector(ResidualTestDetector):
     """Randomised subsampling with L = 1; the score is the number of rejections in a row.
 
@@ -142,8 +130,8 @@ class SubsamplingDetector(ResidualTestDetector):
     many times in a row.
     """
 
-    name: str = "randomised subsampling"
-    parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"doublings": Parameter(3, 7, integer=True)})
+    name = "randomised subsampling"
+    parameters = MappingProxyType({"doublings": Parameter(3, 7, integer=True)})
 
     def channel_scores(self, parameters: Mapping[str, float], white: Array) -> Array:
         subsets = 2 ** int(parameters["doublings"])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +37,8 @@ class KalmanChiSquare(ThresholdDetector):
     """Kalman filter, and the chi-square statistic of its last innovations; it only detects."""
 
     model: GaussianModel
-    name: str = "Kalman, chi-square"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {"process_noise": PROCESS_NOISE, "samples": WINDOW}
-    )
+    name = "Kalman, chi-square"
+    parameters = MappingProxyType({"process_noise": PROCESS_NOISE, "samples": WINDOW})
 
     def prepare(self, log: Log) -> Evaluated:
         return Evaluated(self.model.samples(log))
@@ -64,16 +63,12 @@ class StatedFaults(ThresholdDetector):
         return Evaluated(self.model.samples(log), tuple(model.samples(log) for model in self.stated.values()))
 
 
-@dataclass(frozen=True)
 class MultipleModels(StatedFaults):
     """Interacting multiple models; the score is the log odds of a fault, the isolated fault the one that has 95 %."""
 
-    name: str = "Kalman bank, IMM"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {
-            "process_noise": PROCESS_NOISE,
-            "switching": Parameter(1e-6, 1e-2, logarithmic=True),
-        }
+    name = "Kalman bank, IMM"
+    parameters = MappingProxyType(
+        {"process_noise": PROCESS_NOISE, "switching": Parameter(1e-6, 1e-2, logarithmic=True)}
     )
 
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
@@ -93,12 +88,11 @@ class MultipleModels(StatedFaults):
         )
 
 
-@dataclass(frozen=True)
 class ParityTest(StatedFaults):
     """Parity space; a fault is isolated if it alone brings the parity vector below the threshold."""
 
-    name: str = "parity space"
-    parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"order": Parameter(1, 6, integer=True)})
+    name = "parity space"
+    parameters = MappingProxyType({"order": Parameter(1, 6, integer=True)})
 
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return self._space(setting).over(prepared.nominal).squares
@@ -116,17 +110,14 @@ class ParityTest(StatedFaults):
         return ParitySpace(self.model, order=int(setting.parameters["order"]))
 
 
-@dataclass(frozen=True)
 class UnknownInputBank(StatedFaults):
     """One unknown-input observer a fault, blind to it; a fault is isolated if its observer alone stays quiet.
 
     Detection is by the observer without unknown inputs, the Kalman filter.
     """
 
-    name: str = "unknown-input bank"
-    parameters: Mapping[str, Parameter] = field(
-        default_factory=lambda: {"process_noise": PROCESS_NOISE, "samples": WINDOW}
-    )
+    name = "unknown-input bank"
+    parameters = MappingProxyType({"process_noise": PROCESS_NOISE, "samples": WINDOW})
 
     def scores(self, setting: Setting, prepared: Evaluated) -> Array:
         return window_sums(self._filter(setting).over(prepared.nominal).squares, setting.parameters["samples"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ class ThresholdDetector(ABC):
     name: str
     kind: Kind = "threshold"
     faults: tuple[str, ...] = ()
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, Parameter] = MappingProxyType({})
     fixed: Setting | None = None
 
     @abstractmethod

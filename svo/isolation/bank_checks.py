@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
+from svo.checks import is_count
 from svo.isolation.logic import NOMINAL
 from svo.observers.base import Observer
 
@@ -31,16 +30,13 @@ def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[s
 
 def check_counts(debounce: int, recovery: int | None, timeout: int | None) -> None:
     """Refuse counts of samples below one."""
-    _check_count("debounce", debounce)
-    _check_count("recovery", recovery, optional=True)
-    _check_count("timeout", timeout, optional=True)
-
-
-def _check_count(name: str, value: int | None, optional: bool = False) -> None:
-    if value is None and optional:
-        return
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1{', or None' if optional else ''}")
+    for name, value, or_none in (
+        ("debounce", debounce, ""),
+        ("recovery", recovery, ", or None"),
+        ("timeout", timeout, ", or None"),
+    ):
+        if not (is_count(value, 1) or (or_none and value is None)):
+            raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1{or_none}")
 
 
 def check_observers(observers: Mapping[str, Observer], same_states: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ class Log:
     y: Array
     _: KW_ONLY
     x: Array | None = None
-    schedule: Array | None = field(default=None)
+    schedule: Array | None = None
 
     def __post_init__(self) -> None:
         time = real_array("time", self.time, ("K",), finite=False)

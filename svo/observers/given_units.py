@@ -13,7 +13,7 @@ import numpy as np
 from polytopes import Certificate, HPolytope
 from polytopes.exact import rational
 from svo.checks import Array
-from svo.models.normal_form import NormalForm, lengthened, set_in
+from svo.models.normal_form import NormalForm, lengthened
 from svo.observers.polytope.certificate import (
     AnyCertificate,
     MeasuredOutput,
@@ -24,11 +24,6 @@ from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import ArrivalSet, WindowSample
 from svo.observers.zonotope.certificate import ZonotopeCertificate
 from svo.observers.zonotope.zonotope import ConstrainedZonotope
-
-
-def set_out(P: HPolytope, unit: Array) -> HPolytope:
-    """{unit x' : x' in P}."""
-    return set_in(P, 1.0 / unit)
 
 
 def arrival_in(arrival: ArrivalSet, form: NormalForm) -> ArrivalSet:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import Array, is_finite_number, readings, real_array
+from svo.checks import Array, is_count, is_finite_number, readings, real_array
 
 
 class Decision(NamedTuple):
@@ -162,7 +162,7 @@ def check_probability(**values: float) -> None:
 
 def check_count(name: str, value: int, least: int) -> None:
     """Refuse what is not a whole number of at least so much."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+    if not is_count(value, least):
         raise ValueError(f"{name} is {value!r}; expected a whole number >= {least}")
 
 

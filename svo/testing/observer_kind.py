@@ -66,12 +66,10 @@ class Kind:
                 continue
         return found
 
-    def that_can(self, capability: str) -> Any:
-        """A fresh observer that declares a ``capability``, such as "takes_late"."""
-        observer = self.observer()
-        if not getattr(observer, capability, False):
+    def that_can(self, capability: str) -> None:
+        """Raise `NotApplicable` unless it declares a ``capability``, such as "takes_late"."""
+        if not getattr(self.observer(), capability, False):
             raise NotApplicable(f"the observer does not declare {capability}")
-        return observer
 
     def answers(self, log: Log, system: System = PLAIN) -> list[Answer]:
         """Those of a fresh observer for a ``system`` over a ``log``."""

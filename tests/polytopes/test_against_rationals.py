@@ -5,8 +5,6 @@ The result of an operation, its floats taken as rationals, must be the exact set
 of systems of each kind, `make test-slow` several thousand.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 import ppl
 import pytest
@@ -18,7 +16,6 @@ from polytopes.projection import METHODS
 
 AMOUNT = pytest.mark.parametrize("count", [150, pytest.param(1400, marks=pytest.mark.slow)])
 EVERY = pytest.mark.parametrize("kind", KINDS)
-Operation = Callable[[str, np.random.Generator, HPolytope], None]
 
 
 def assert_exact(result: HPolytope, exact: ppl.C_Polyhedron, case: str) -> None:

@@ -57,7 +57,7 @@ class RowReader:
         if not line.text.strip():
             return None
         if self._is_first:
-            self._read_header(place, self._cells(place, line.text))
+            self._read_header(self._cells(place, line.text))
             self._is_first = False
             return None
         try:
@@ -76,7 +76,7 @@ class RowReader:
             return None
         if starts or self._parser is None:
             try:
-                self._read_header(place, cells)
+                self._read_header(cells)
                 return None
             except ValueError:
                 if self._parser is None:
@@ -101,7 +101,7 @@ class RowReader:
             values[1 + inputs :] = np.nan
         return Row(float(values[0]), values[1 : 1 + inputs], values[1 + inputs : 1 + inputs + outputs], place)
 
-    def _read_header(self, place: str, cells: list[str]) -> None:
+    def _read_header(self, cells: list[str]) -> None:
         self._parser = RowParser(self._source, cells, self._columns)
         self._header = cells
 
@@ -117,7 +117,7 @@ class RowReader:
     def resume(self, header: Sequence[str]) -> None:
         """Go on under a header that `state` gave; the log may be another file by now."""
         if header:
-            self._read_header(self._source, list(header))
+            self._read_header(list(header))
             self._is_first, self._is_new_file = False, True
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from stored_alarms import same, stored, with_digest
 
 from polytopes import HPolytope
 from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms, write_alarms
@@ -38,32 +38,9 @@ def case() -> tuple[Alarm, Log]:
     return Alarm("healthy cart", sample, float(log.time[sample]), run.certificate, source), log
 
 
-def stored(tmp_path: Path, *alarms: Alarm) -> Path:
-    path = tmp_path / "alarms.jsonl"
-    write_alarms(path, alarms)
-    return path
-
-
 def check(path: Path, log: Log | None = None) -> AlarmCheck:
     (only,) = verify_alarms(path, log)
     return only
-
-
-def with_digest(record: dict[str, Any]) -> str:
-    content = {key: value for key, value in record.items() if key != "sha256"}
-    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-    return json.dumps(content | {"sha256": digest}) + "\n"
-
-
-def same(a: Any, b: Any) -> bool:
-    """Equal in type and in every bit."""
-    if isinstance(a, np.ndarray):
-        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-    if isinstance(a, tuple):
-        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
-    if hasattr(a, "__dataclass_fields__"):
-        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-    return type(a) is type(b) and a == b
 
 
 def test_alarms_come_back_bit_for_bit(tmp_path: Path, case: tuple[Alarm, Log]) -> None:
