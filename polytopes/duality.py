@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from polytopes import kernel
 from polytopes.affine import exact_sums
 from polytopes.checks import Floats
 
@@ -36,6 +37,19 @@ class Bounds:
 def _raised(values: Floats, spare: Floats, more: Floats) -> Floats:
     """Floats that are at least ``values - spare + more``."""
     return np.where(more > spare, np.nextafter(values + more, np.inf), values)
+
+
+def equality_multipliers(C: Floats, d: Floats, forms: Floats) -> Floats:
+    """Multipliers (k, q) with which the rows of ``C x = d`` add up to forms (k, n) in their span, up to rounding.
+
+    Solved in units in which the rows are even: least squares of rows as given drop those that are small beside others.
+    """
+    if not (d.size and len(forms)):
+        return np.zeros((len(forms), d.size))
+    rows, columns = kernel.exponents(C, d)
+    even = np.ldexp(np.ldexp(C, rows[:, None]), columns)
+    found = np.linalg.lstsq(even.T, np.ldexp(forms, columns).T, rcond=None)[0].T
+    return np.asarray(np.ldexp(found, rows))
 
 
 def multiplier_bounds(AT: Floats, b: Floats, c: Floats, y: Floats) -> Bounds:

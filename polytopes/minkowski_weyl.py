@@ -127,7 +127,7 @@ def _directions(rays: Integers, M: Integers) -> Integers:
 def distinct(rows: Integers) -> Integers:
     """Rows without repetitions, in the order of their first occurrence."""
     first = dict.fromkeys(map(tuple, rows.tolist()))
-    return stacked(np.array(list(first), dtype=rows.dtype).reshape(-1, rows.shape[1]))
+    return stacked(np.array(list(first), dtype=rows.dtype).reshape(len(first), rows.shape[1]))
 
 
 def stacked(*tables: Integers) -> Integers:

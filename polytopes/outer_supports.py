@@ -13,6 +13,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from polytopes.checks import Floats
+from polytopes.duality import equality_multipliers
 from polytopes.errors import UndecidedError
 from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
 from polytopes.integers import up
@@ -105,7 +106,7 @@ def _by_duality(P: Rows, directions: Floats, uncertain: Floats) -> tuple[Floats,
 def _duality(P: Rows, rows: Floats, best: Maxima, moved: Floats | None) -> tuple[Floats, Floats]:
     """Constants (k,) and weights (k, n) with ``c'x <= constant + weights'|x|`` all over P; rounding is in them."""
     Y = np.where(np.isfinite(best.values)[:, None], np.maximum(best.multipliers, 0.0), 0.0)
-    Z = np.linalg.lstsq(P.C.T, (rows - Y @ P.A).T, rcond=None)[0].T if P.d.size else np.zeros((len(rows), 0))
+    Z = equality_multipliers(P.C, P.d, rows - Y @ P.A)
     unit = (np.count_nonzero(Y, axis=1).max() + P.d.size + P.dim + 4) * _EPS
     sizes = np.abs(np.hstack([np.vstack([P.A, P.C]), np.append(P.b, P.d)[:, None]]))
     spread = np.hstack([Y, np.abs(Z)]) @ (unit * sizes + (0.0 if moved is None else moved))
@@ -121,7 +122,7 @@ def _proved_reach(values: Floats, constant: Floats, weights: Floats) -> Floats |
     if not np.isfinite(values).all():
         return None
     sizes = np.abs(values).reshape(2, -1).max(axis=0)
-    guess = 2.0 * sizes + max(float(sizes.max()), _TINY) * 1e-9
+    guess = 2.0 * sizes + _TINY
     for _ in range(4):
         ends = (constant + weights @ guess).reshape(2, -1).max(axis=0)
         ends += 4.0 * _EPS * np.abs(ends)

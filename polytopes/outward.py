@@ -43,8 +43,7 @@ def _near_rows(generators: ExactGenerators, inequalities: Integers, equalities: 
     along, flat = _along(inequalities[:, :-1], equalities), all(map(are_floats, equalities))
     normals = OutwardNormals(whole, along)
     exact = [as_floats(row, row[:-1]) for row in equalities if are_floats(row)]
-    pairs = [sign * v for row in equalities if not are_floats(row) for sign in (1, -1) for v in row[:-1]]
-    sides = np.array(pairs, dtype=object).reshape(-1, generators.dim).tolist()
+    sides = [[sign * v for v in row[:-1]] for row in equalities if not are_floats(row) for sign in (1, -1)]
     rows = [
         as_floats(row, row[:-1]) if flat and are_floats(row) else normals.row(normal)
         for row, normal in zip(inequalities.tolist(), along, strict=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes.checks import Floats, real_array
+from polytopes.duality import equality_multipliers
 from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.linear_program import UNDECIDED, Maxima
 from polytopes.rows import Rows
@@ -90,7 +91,7 @@ def support_points(P: Rows, directions: ArrayLike) -> SupportResult:
     """Values, points and multipliers for one direction (n,) or a batch (k, n)."""
     batch = np.atleast_2d(_directions(P, directions))
     result = maxima(P, batch)
-    k, q = len(batch), P.C.shape[0]
+    k, q = len(batch), P.d.size
     if result is None:
         nowhere = np.full((k, P.dim), np.nan)
         return SupportResult(np.full(k, -np.inf), nowhere, np.zeros((k, P.b.size)), np.zeros((k, q)))
@@ -98,9 +99,7 @@ def support_points(P: Rows, directions: ArrayLike) -> SupportResult:
     points = np.where(finite[:, None], result.points, np.nan)
     multipliers = np.where(finite[:, None], result.multipliers, 0.0)
     fixed = np.zeros((k, q))
-    if q and finite.any():
-        remainder = batch[finite] - multipliers[finite] @ P.A
-        fixed[finite] = np.linalg.lstsq(P.C.T, remainder.T, rcond=None)[0].T
+    fixed[finite] = equality_multipliers(P.C, P.d, batch[finite] - multipliers[finite] @ P.A)
     return SupportResult(result.values, points, multipliers, fixed)
 
 

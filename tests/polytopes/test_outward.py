@@ -33,9 +33,9 @@ def decimals(rng: np.random.Generator, kind: str, n: int) -> tuple[np.ndarray, n
     return np.array(points) * unit + rng.integers(-9, 10, n) * 0.1, np.reshape(rays, (-1, n)) * unit
 
 
-def whole(table: np.ndarray) -> np.ndarray:
+def whole(table: np.ndarray, scale: int = SCALE) -> np.ndarray:
     """Floats times 2^60, exactly."""
-    return np.array([int(Fraction(v) * SCALE) for v in table.ravel().tolist()], dtype=object).reshape(table.shape)
+    return np.array([int(Fraction(v) * scale) for v in table.ravel().tolist()], dtype=object).reshape(table.shape)
 
 
 def pairs(count: int) -> Iterator[tuple[str, np.random.Generator, HPolytope, HPolytope]]:
@@ -117,3 +117,15 @@ def test_slices_of_a_box(normal: list[float]) -> None:
     both = polyhedron(P)
     both.poly_hull_assign(polyhedron(Q))
     assert_outer(convex_hull([P, Q]), both, "hull")
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_an_image_that_is_a_point_but_for_rounding(seed: int) -> None:
+    """Thin in every direction: no coordinate is left that its shadow could be taken on."""
+    rng = np.random.default_rng(seed)
+    n = 1 + seed % 3
+    flat = (rng.normal(size=(1, n)), [0.0]) if seed % 2 and n > 1 else ()
+    P = HPolytope(np.vstack([np.eye(n), -np.eye(n)]), rng.uniform(1.0, 2.0, 2 * n), *flat)
+    M, t = np.ldexp(rng.normal(size=(n, n)), -58), rng.uniform(1.0, 2.0, n)
+    scale = 2**140  # all bits of the floats below
+    assert_outer(P.affine_map(M, t), mapped(polyhedron(P), whole(M, scale), whole(t, scale), scale), f"in {n}")

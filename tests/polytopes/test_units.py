@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from polytopes import Certificate, HPolytope, duality
 from polytopes.emptiness import strictly_inside
 from polytopes.linear_program import Program
+from polytopes.outer_supports import reach
 
 Floats = NDArray[np.float64]
 
@@ -186,3 +187,26 @@ def test_bounds_from_any_multipliers_hold() -> None:
         y = np.maximum(HPolytope(A, b).support_points(c).multipliers[0] + 1e-9 * rng.standard_normal(15), 0.0)
         bound = duality.multiplier_bounds(np.ascontiguousarray(A.T), b, c, y).over(np.ones(3))[0]
         assert Fraction(float(bound)) >= exact_support(polyhedron(HPolytope(A, b)), c)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_multipliers_of_equalities_in_other_units_combine_to_the_direction(seed: int) -> None:
+    """Least squares of the rows as given left out an equality that is small beside another one."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 5))
+    C, x = rng.integers(-4, 5, (int(rng.integers(1, n)), n)).astype(float), rng.integers(-4, 5, n).astype(float)
+    if np.linalg.matrix_rank(C) < len(C):  # parallel rows: any two multipliers with the right sum will do
+        C[0] = C[-1]
+    ones = np.vstack([np.eye(n), -np.eye(n)])
+    P = HPolytope(ones, ones @ x + 1.0, C, C @ x)
+    columns, rows = rng.integers(-60, 61, n), rng.integers(-60, 61, P.b.size + P.d.size)
+    Q, D = in_units(P, columns, rows), np.vstack([ones, rng.integers(-3, 4, (4, n))])
+    answer = Q.support_points(np.ldexp(D, -columns))
+    np.testing.assert_allclose(answer.values, P.support(D), rtol=1e-9, atol=1e-9)
+    combined = answer.multipliers @ Q.A + answer.equality_multipliers @ Q.C
+    np.testing.assert_allclose(np.ldexp(combined, columns), D, rtol=0, atol=1e-9)
+    most = reach(Q)
+    assert most is not None
+    lower, upper = P.bounding_box()
+    right = np.maximum(np.abs(lower), np.abs(upper))
+    np.testing.assert_allclose(np.ldexp(most, -columns), right, rtol=1e-6, atol=1e-6)
