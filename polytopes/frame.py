@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from polytopes.checks import Floats
+from polytopes.errors import UndecidedError
 from polytopes.exact import substituted
 from polytopes.linear_program import OPTIMAL, prepare_as_given
 
@@ -21,16 +22,36 @@ def unit_frame(oracle: Oracle, centre: Floats) -> Floats:
 
     Widths along the current axes scale them; where the support points then lie near a subspace (a thin, skew set), the
     axes turn to the principal ones and the widths are taken again.
+
+    Raises
+    ------
+    UndecidedError
+        If rounding leaves no width, or no support point.
     """
     frame = _scaled(oracle, np.eye(centre.size))
     for _ in range(3):
-        axes = np.linalg.inv(frame)
-        points = (oracle(np.vstack([axes, -axes])) - centre) @ axes.T
+        axes = inverted(frame)
+        points = _told((oracle(np.vstack([axes, -axes])) - centre) @ axes.T)
         spread, principal = principal_axes(points)
         if spread[-1] > _EVEN:
             break
         frame = _scaled(oracle, frame @ principal.T)
-    return frame
+    return _told(frame)
+
+
+def inverted(frame: Floats) -> Floats:
+    """The inverse of axes (columns); UndecidedError if rounding left one without a width."""
+    try:
+        return _told(np.asarray(np.linalg.inv(frame), dtype=np.float64))
+    except np.linalg.LinAlgError:
+        return _told(np.full_like(frame, np.nan))
+
+
+def _told(values: Floats) -> Floats:
+    """The values, if floats can tell them."""
+    if not np.isfinite(values).all():
+        raise UndecidedError("the set is too thin for coordinates in which it is about round.")
+    return values
 
 
 def principal_axes(points: Floats) -> tuple[Floats, Floats]:
@@ -44,7 +65,7 @@ def principal_axes(points: Floats) -> tuple[Floats, Floats]:
 
 def _scaled(oracle: Oracle, frame: Floats) -> Floats:
     """The axes multiplied by the widths of the set along them."""
-    axes = np.asarray(np.linalg.inv(frame), dtype=np.float64)
+    axes = inverted(frame)
     above, below = oracle(axes), oracle(-axes)
     noise = _NOISE * (np.abs(np.vstack([above, below])).max(axis=0) * np.abs(axes)).sum(axis=1)
     scaled: Floats = frame * np.maximum(((above - below) * axes).sum(axis=1), np.maximum(noise, 1e-300))
@@ -105,5 +126,7 @@ def _measured(rows: Floats, rhs: Floats) -> tuple[Floats, Floats, float] | None:
     radius = program.balanced.interior.radius / reach if program.balanced is program and reach > 0.0 else 0.0
     if radius > _ROUND and 0.1 < reach < 10.0:
         return point, axes, radius
-    turn = unit_frame(lambda directions: program.maximise(directions).points, point)
-    return (point, turn, 0.0) if np.isfinite(turn).all() else None
+    try:
+        return point, unit_frame(lambda directions: program.maximise(directions).points, point), 0.0
+    except UndecidedError:
+        return None

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.checks import Floats
-from polytopes.frame import Oracle, principal_axes, unit_frame
+from polytopes.frame import Oracle, inverted, principal_axes, unit_frame
 from polytopes.qhull import point_hull
 from polytopes.redundancy import irredundant
 
@@ -170,7 +170,7 @@ def normals_by_supports(oracle: Oracle, inner: Floats) -> Floats:
     if n == 1:
         return np.array([[1.0], [-1.0]])
     frame = unit_frame(oracle, inner)
-    axes = np.linalg.inv(frame)
+    axes = inverted(frame)
 
     def scaled_oracle(directions: Floats) -> Floats:
         points: Floats = (oracle(directions @ axes) - inner) @ axes.T

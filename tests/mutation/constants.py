@@ -39,6 +39,7 @@ class Constant:
 
 ROUNDED = f"{CORE}/test_rounding_outward.py"
 SETS = "tests/polytopes"
+POLYTOPE = "tests/svo/observers/polytope"
 
 CONSTANTS = (
     Constant("svo.models.discretisation", "_ROUNDED_UP", "outward", "tests/svo/models/test_inside_a_sample.py"),
@@ -47,6 +48,7 @@ CONSTANTS = (
     Constant("svo.models.state_range", "_EPS", "outward", ROUNDED),
     Constant("svo.observers.zonotope.zonotope", "EPS", "outward", CORE),
     Constant("svo.observers.polytope.vertex_images", "_OUTWARD", "outward", ROUNDED),
+    Constant("svo.observers.polytope.output_rows", "_ROUNDING", "outward", f"{POLYTOPE}/test_rounding_of_rows.py"),
     Constant("svo.observers.window.output_injection", "_UNIT", "outward", ROUNDED),
     Constant("svo.residual_tests.threshold", "_ROUNDING", "outward", "tests/svo/residual_tests"),
     Constant("svo.interval.thresholds", "_EPS", "outward", "tests/svo/interval/test_rounding.py"),

@@ -7,8 +7,10 @@ import pytest
 from exact_sets import minimal_size, polyhedron
 from sets import CATALOGUE, EMPTY
 
-from polytopes import Certificate, HPolytope, UnboundedError, convex_hull
+from polytopes import Certificate, HPolytope, UnboundedError, UndecidedError, convex_hull
+from polytopes.frame import unit_frame
 from polytopes.projection import METHODS
+from polytopes.redundancy import settle
 
 
 def test_a_thin_rectangle_has_four_vertices() -> None:
@@ -169,3 +171,17 @@ def test_rays_on_axes_of_different_scales_stay_in_the_set(seed: int) -> None:
     assert len(P.b) > 0
     assert (1e-9 * lengths[:, None] >= P.A @ rays.T).all()
     assert (P.b[:, None] + 1e-9 * (np.abs(P.A) @ np.abs(V).max(axis=0))[:, None] >= P.A @ V.T).all()
+
+
+def test_rows_that_meet_leave_no_width_to_measure() -> None:
+    """An elimination in floats may end in such rows: numpy's LinAlgError came out of the polytope observer."""
+    side = float.fromhex("0x1.f8f4b01938a56p+10")
+    rows, rhs = np.array([[-0.5], [0.5]]), np.array([side, -side])
+    assert settle(rows, rhs, np.array([-2.0 * side]), np.array([True, True])).tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_support_points_that_tell_no_width(value: float) -> None:
+    centre = np.zeros(2)
+    with pytest.raises(UndecidedError, match="too thin"):
+        unit_frame(lambda directions: np.full((len(directions), 2), value), centre)

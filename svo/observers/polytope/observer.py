@@ -75,7 +75,7 @@ class PolytopeObserver(RecursiveObserver[Sample]):
         output). None = exact, until a set has more than 500 facets or its elimination forms more than 5000 rows.
     eps : float
         Every measurement row is widened by eps (|y| + |C||x|max + |D u| + |c| + |F| wmax + n), for the rounding
-        of the data.
+        of the data, and by its own rounding.
     as_published : bool
         Equation (3) as printed, for reproduction only: unsound with uncertain A, and it warns. No F and no
         uncertain output.

@@ -9,6 +9,8 @@ from svo.checks import Array
 from svo.models.model import UncertainModel
 from svo.observers.polytope.vertex_images import outer_support, reach_of
 
+_ROUNDING = 2.0**-51  # of the terms of a row, for each of them
+
 
 def output_rows(
     model: UncertainModel, stack: Array, joint: HPolytope, u: Array, y: Array, noise: Array, eps: float
@@ -17,8 +19,8 @@ def output_rows(
 
     Each product p = Delta_i s_i, one a sensor, lies between the chords of max and min over Delta of Delta s on the
     interval of s_i over ``joint``: the convex hull of all (s, p). A Delta shared by several sensors, or by state and
-    output, is taken as free in each. Rows are widened by eps times the magnitude of all terms. No hull over the
-    vertices of Delta would do: y = Delta x, Delta in [-1, 1], leaves out x = 100 y.
+    output, is taken as free in each. Rows are widened by eps times the magnitude of all terms, and by their own
+    rounding. No hull over the vertices of Delta would do: y = Delta x, Delta in [-1, 1], leaves out x = 100 y.
 
     Parameters
     ----------
@@ -34,6 +36,7 @@ def output_rows(
     states = list(range(layout.n)) + list(range(layout.n + layout.nu + 1, layout.shape[1]))
     known = np.concatenate([u, [1.0]])
     reach = reach_of(joint)
+    slack = eps + _ROUNDING * (stack[0].shape[1] + 1 + 4 * len(model.uncertainties))
     A, b = [], []
     for o in np.flatnonzero(~np.isnan(y)):
         rows = stack[:, layout.n + o]
@@ -47,7 +50,7 @@ def output_rows(
                 up, down = _chords(s, joint, uncertainty.bounds)
                 above, below = above + up, below + down
                 magnitude += np.abs(uncertainty.bounds).max() * sizes[i]
-        width = noise[o] + eps * magnitude
+        width = noise[o] + slack * magnitude
         A += [below[:-1], -above[:-1]]
         b += [y[o] + width - below[-1], above[-1] - y[o] + width]
     return HPolytope(np.reshape(A, (-1, joint.dim)), np.array(b))

@@ -86,11 +86,7 @@ def _exact_image(joint: HPolytope, M: Array, t: Array, max_facets: int | None) -
     A, E = M[:, :n], M[:, n:]
     if E.shape[1] == 0 or np.linalg.cond(A) > _INVERTIBLE:
         return joint.affine_map(M, t)
-    back = np.linalg.inv(A)
-    nw = E.shape[1]
-    inverse = np.block([[back, -back @ E], [np.zeros((nw, n)), np.eye(nw)]])
-    shift = np.concatenate([-back @ t, np.zeros(nw)])  # the rounding of these rows is small beside what `outward` adds
-    lifted = HPolytope(joint.A @ inverse, joint.b - joint.A @ shift, joint.C @ inverse, joint.d - joint.C @ shift)
+    lifted = _pulled_back(joint, A, E, t)
     rows = _EXACT_ROWS if max_facets is None else _BUDGET_ROWS
     try:
         return lifted.project(range(n), method="fourier-motzkin", max_rows=rows, outer=max_facets is not None)
@@ -98,6 +94,26 @@ def _exact_image(joint: HPolytope, M: Array, t: Array, max_facets: int | None) -
         raise FacetLimitError(
             f"the projection on the next state forms more than {_EXACT_ROWS} rows in one step of elimination"
         ) from error
+
+
+def _pulled_back(joint: HPolytope, A: Array, E: Array, t: Array) -> HPolytope:
+    """A set of (x, w) as rows over (x', w) with x' = A x + E w + t, outward.
+
+    With an inverse in floats x = back (x' - E w - t) + (I - back A) x: the last term and the rounding of the rows are
+    bounded over the set. Equalities become two rows.
+    """
+    (n, nw), back, reach = E.shape, np.linalg.inv(A), reach_of(joint)
+    inverse = np.block([[back, -back @ E], [np.zeros((nw, n)), np.eye(nw)]])
+    shift = np.concatenate([-back @ t, np.zeros(nw)])
+    rows, sides = np.vstack([joint.A, joint.C, -joint.C]), np.concatenate([joint.b, joint.d, -joint.d])
+    unit, sizes = (2 * joint.dim + 4) * float(np.finfo(np.float64).eps), np.abs(back)
+    ahead = np.abs(np.hstack([A, E])) @ reach + np.abs(t)  # of |x'|
+    terms = np.concatenate([sizes @ (ahead + np.abs(E) @ reach[n:] + np.abs(t)), reach[n:]])
+    missed = (np.abs(np.eye(n) - back @ A) + unit * sizes @ np.abs(A)) @ reach[:n]
+    room = np.abs(rows[:, :n]) @ missed + unit * (np.abs(rows) @ terms + np.abs(sides))
+    lifted, flat = rows @ inverse, np.s_[joint.b.size :]
+    room[flat] += _OUTWARD * np.abs(lifted[flat]) @ np.concatenate([ahead, reach[n:]])
+    return HPolytope(lifted, sides - rows @ shift + room)
 
 
 def limited(P: HPolytope, max_facets: int | None) -> HPolytope:
@@ -119,22 +135,18 @@ def limited(P: HPolytope, max_facets: int | None) -> HPolytope:
 def template(sets: Sequence[HPolytope], normals: Array, flat: Array) -> HPolytope:
     """Smallest polytope around several sets with the given normals (k, n), rounded outward.
 
-    Directions ``flat`` (q, n) give an equality where the sets are flat to rounding, otherwise two rows.
+    Directions ``flat`` (q, n) give two rows.
     """
     rows = np.vstack([normals, flat, -flat])
     reach = np.max([reach_of(P) for P in sets], axis=0)
     room = _OUTWARD * np.abs(rows) @ reach
-    values = np.max([outer_support(P, rows) for P in sets], axis=0)
-    k, q = len(normals), len(flat)
-    upper, lower = values[k : k + q], -values[k + q :]
-    even = upper - lower <= room[k : k + q]
-    kept = np.concatenate([np.full(k, True), ~even, ~even])
-    return HPolytope(rows[kept], (values + room)[kept], flat[even], ((upper + lower) / 2.0)[even])
+    return HPolytope(rows, np.max([outer_support(P, rows) for P in sets], axis=0) + room)
 
 
 def outward(P: HPolytope) -> HPolytope:
-    """P with every inequality moved outward, by 3e-12 of the terms of the row over P."""
-    return P.with_rows(P.A, P.b + _OUTWARD * np.abs(P.A) @ reach_of(P))
+    """P with every row moved outward, by 3e-12 of its terms over P; equalities become two rows."""
+    rows, sides = np.vstack([P.A, P.C, -P.C]), np.concatenate([P.b, P.d, -P.d])
+    return HPolytope(rows, sides + _OUTWARD * np.abs(rows) @ reach_of(P))
 
 
 def reach_of(P: HPolytope) -> Array:
