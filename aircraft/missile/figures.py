@@ -90,7 +90,5 @@ def plot_residual(flights: Flights, run: Run, scenario: Scenario, name: str, ax:
         artists.append(ax.text(start, 1.01, fault, transform=place, ha="center", va="bottom", fontsize="small"))
     seen = slice(0, round(70.0 / TS))  # the last seconds, near the intercept, would hide the rest
     extent = 1.1 * scale * max(float(np.nanmax(np.abs(log[name][seen]))), float(np.nanmax(bound[seen])))
-    ax.set_ylim(-extent, extent)
-    ax.set_xlim(0.0, DURATION)
-    ax.set_ylabel(f"{name} [{unit}]")
+    ax.set(xlim=(0.0, DURATION), ylim=(-extent, extent), ylabel=f"{name} [{unit}]")
     return artists

@@ -49,8 +49,7 @@ def plot_comparison(rows: Sequence[ComparisonRow], rate: float, Ts: float, longe
         _time_axis(ax, f"{scenario[0]}, {scenario[1]}", Ts, never)
     _false_alarms(axes[0][-1], detectors, rows, rate, offsets)
     first = axes[0][0]
-    first.set_yticks(range(len(detectors)), detectors)
-    first.set_ylim(len(detectors) - 0.5, -0.5)
+    first.set(yticks=range(len(detectors)), yticklabels=detectors, ylim=(len(detectors) - 0.5, -0.5))
     figure.supxlabel("time after the fault [s]", fontsize=10, x=0.5)
     _legend(figure, [row.distribution for row in rows])
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.45 / height))
@@ -69,15 +68,11 @@ def _delays(ax: Axes, y: float, row: ComparisonRow, never: float) -> None:
 
 
 def _time_axis(ax: Axes, title: str, Ts: float, never: float) -> None:
-    ax.set_title(title, fontsize=10)
-    ax.set_xscale("log")
-    ax.set_xlim(0.6 * Ts, never)
     ticks = [t for t in (0.01, 0.1, 1.0, 10.0) if 0.6 * Ts < t < 0.4 * never]
-    ax.set_xticks([*ticks, never], [*(f"{t:g}" for t in ticks), "never"])
-    ax.minorticks_off()
-    ax.tick_params(axis="y", length=0)
-    ax.grid(axis="both", color=_GRID, linewidth=0.6, zorder=0)
-    ax.set_axisbelow(True)
+    ax.set(
+        xscale="log", xlim=(0.6 * Ts, never), xticks=[*ticks, never], xticklabels=[*(f"{t:g}" for t in ticks), "never"]
+    )
+    _dress(ax, title)
 
 
 def _false_alarms(
@@ -90,13 +85,17 @@ def _false_alarms(
         ax.plot([100 * low, 100 * high], [y, y], color=COLOURS[distribution], linewidth=1.4)
         ax.plot(100 * share.value, y, "o", color=COLOURS[distribution], markersize=5, clip_on=False)
     ax.axvline(100 * rate, color="#5B6470", linewidth=1, linestyle="--")
-    ax.set_title(f"false alarms [%]\ntuned for {100 * rate:g} %", fontsize=10)
     ax.set_xscale("symlog", linthresh=5.0)
-    ax.set_xlim(0, 100)
-    ax.set_xticks([0, 2, 5, 20, 100], ["0", "2", "5", "20", "100"])
+    ax.set(xlim=(0, 100), xticks=[0, 2, 5, 20, 100], xticklabels=["0", "2", "5", "20", "100"])
+    _dress(ax, f"false alarms [%]\ntuned for {100 * rate:g} %")
+
+
+def _dress(ax: Axes, title: str) -> None:
+    """Title, grid and ticks as in every panel."""
+    ax.set_title(title, fontsize=10)
     ax.minorticks_off()
     ax.tick_params(axis="y", length=0)
-    ax.grid(axis="both", color=_GRID, linewidth=0.6)
+    ax.grid(axis="both", color=_GRID, linewidth=0.6, zorder=0)
     ax.set_axisbelow(True)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from svo.plant import HEALTHY, Plant, fault_start
-from svo.store import file_name, write_whole
+from svo.store import file_name
+from svo.studies.drawing import STYLE, new_figure, save_picture
 from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.summary import ConditionSummary
@@ -16,21 +17,6 @@ from svo.studies.page import Picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-STYLE: Any = {
-    "font.size": 9.5,
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#8A929B",
-    "xtick.color": "#3B434B",
-    "ytick.color": "#3B434B",
-    "legend.frameon": False,
-    "savefig.facecolor": "white",
-}
-DPI = 150
 
 
 def write_pictures(
@@ -85,7 +71,7 @@ def _of_runs(folder: Path, plant: Plant, shown: Sequence[Exemplar], where: str, 
 
 def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
     conditions = len({(s.fault, s.profile) for s in summaries})
-    figure = _figure(max(6.5, 1.0 * conditions), 6.0)
+    figure = new_figure(max(6.5, 1.0 * conditions), 6.0)
     axes = figure.subplots(2, 1, sharex=True)
     for ax, event in zip(axes, ("detect", "isolate"), strict=True):
         plots.plot_architectures(summaries, event, plant.Ts, plant.reference, ax)
@@ -98,7 +84,7 @@ def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figur
 def _delays(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
     from matplotlib.lines import Line2D
 
-    figure = _figure(max(5.5, 1.0 * len(summaries)), 3.9)
+    figure = new_figure(max(5.5, 1.0 * len(summaries)), 3.9)
     ax = figure.subplots()
     plots.plot_delays(summaries, plant.Ts, plant.reference, ax)
     handles = ax.get_legend_handles_labels()[0]
@@ -118,7 +104,7 @@ def _delays(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
 def _alive(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
     faults = list(dict.fromkeys(e.fault for e in exemplars))
     columns = max(sum(e.fault == fault for e in exemplars) for fault in faults)
-    figure = _figure(3.3 * columns + 0.6, 1.75 * len(faults) + 0.3)
+    figure = new_figure(3.3 * columns + 0.6, 1.75 * len(faults) + 0.3)
     axes = figure.subplots(len(faults), columns, squeeze=False)
     for row, fault in zip(axes, faults, strict=True):
         chosen = [e for e in exemplars if e.fault == fault]
@@ -140,7 +126,7 @@ def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
     # The end of a run, with one set left, says nothing where there is something to see before.
     shown = [e.snapshots[:-1] or e.snapshots for e in exemplars]
     columns = max(len(snapshots) for snapshots in shown)
-    figure = _figure(3.4 * columns + 0.4, 2.7 * len(exemplars) + 0.4)
+    figure = new_figure(3.4 * columns + 0.4, 2.7 * len(exemplars) + 0.4)
     axes = figure.subplots(len(exemplars), columns, squeeze=False)
     for row, exemplar, snapshots in zip(axes, exemplars, shown, strict=True):
         dims = plots.separating_states(exemplar)
@@ -159,7 +145,7 @@ def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
 
 def _bounds(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
     columns = min(2, len(plant.columns.states))
-    figure = _figure(4.6 * columns, 2.2 * len(exemplars) + 0.4)
+    figure = new_figure(4.6 * columns, 2.2 * len(exemplars) + 0.4)
     axes = figure.subplots(len(exemplars), columns, squeeze=False)
     for row, exemplar in zip(axes, exemplars, strict=True):
         window = plots.time_window(exemplar, _start(plant, exemplar), plant.Ts)
@@ -193,18 +179,6 @@ def _slowest(exemplars: Sequence[Exemplar]) -> list[Exemplar]:
         if best is None or exemplar.last_falsification > best.last_falsification:
             slowest[exemplar.fault] = exemplar
     return list(slowest.values())
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def save_picture(path: Path, figure: Figure, title: str, caption: str) -> Picture:
-    """Write a figure as a PNG file, whole or not at all."""
-    write_whole(path, lambda file: figure.savefig(file, dpi=DPI))
-    return Picture(path, title, caption)
 
 
 def _start(plant: Plant, exemplar: Exemplar) -> float:

@@ -50,7 +50,6 @@ def plot_delays(
         marks = [(reference or {}).get((s.fault, s.profile)) for s in faulty]
         artists += _reference_marks(ax, at, [getattr(m, name) if m else "" for m in marks])
     _delay_axes(ax, [f"{s.fault}\n{s.profile}" for s in faulty], Ts / 2)
-    ax.set_ylabel("time after the fault [s]")
     return artists
 
 
@@ -79,7 +78,6 @@ def plot_architectures(
         ax, np.arange(len(conditions), dtype=float), [getattr(m, event) if m else "" for m in marks]
     )
     _delay_axes(ax, [f"{fault}\n{profile}" for fault, profile in conditions], Ts / 2)
-    ax.set_ylabel("time after the fault [s]")
     return artists
 
 
@@ -95,12 +93,11 @@ def _bars(
 def _delay_axes(ax: Axes, labels: Sequence[str], floor: float) -> None:
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    ax.set_yscale("log")
-    ax.set_ylim(bottom=floor)
+    ax.set(yscale="log", ylim=(floor, None), ylabel="time after the fault [s]")
+    ax.set(xticks=range(len(labels)), xticklabels=labels)
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     ax.yaxis.set_minor_formatter(NullFormatter())
-    ax.set_xticks(range(len(labels)), list(labels))
     ax.tick_params(axis="x", length=0)
     ax.grid(axis="y", color="#D9DDE2", linewidth=0.7, zorder=0)
     ax.margins(y=0.15)
@@ -123,11 +120,10 @@ def plot_alive(exemplar: Exemplar, fault_time: float, Ts: float, ax: Axes | None
             when = f"  {in_seconds(until, Ts)}"
             artists.append(ax.text(until, i, when, va="center", fontsize="small", color="#30363D"))
     artists.append(_fault_line(ax))
-    ax.set_yticks(range(len(exemplar.names)), list(exemplar.names))
+    ax.set(yticks=range(len(exemplar.names)), yticklabels=exemplar.names)
+    ax.set(xlim=(start, end), xlabel="time after the fault [s]")
     ax.tick_params(axis="y", length=0)
     ax.invert_yaxis()
-    ax.set_xlim(start, end)
-    ax.set_xlabel("time after the fault [s]")
     return artists
 
 
@@ -147,8 +143,7 @@ def plot_sets(
     true = exemplar.x[snapshot.sample, list(dims)]
     artists += ax.plot(*true, "x", color="#111111", markersize=7, markeredgewidth=1.8, zorder=5)
     ax.margins(0.08)
-    ax.set_xlabel(column_label(states[dims[0]]))
-    ax.set_ylabel(column_label(states[dims[1]]))
+    ax.set(xlabel=column_label(states[dims[0]]), ylabel=column_label(states[dims[1]]))
     return artists
 
 
@@ -167,8 +162,7 @@ def plot_bounds(
         )
     artists += ax.plot(time, exemplar.x[:, state], color="#111111", linewidth=1.1, label="true state")
     artists.append(_fault_line(ax))
-    ax.set_xlabel("time after the fault [s]")
-    ax.set_ylabel(column_label(states[state]))
+    ax.set(xlabel="time after the fault [s]", ylabel=column_label(states[state]))
     return artists
 
 
@@ -194,8 +188,7 @@ def zoom(ax: Axes, exemplar: Exemplar, state: int, fault_time: float, window: tu
     chosen = [0, exemplar.names.index(exemplar.fault)]
     low, high = (bound[inside][:, chosen, state] for bound in (exemplar.lower, exemplar.upper))
     span = np.nanmax(high) - np.nanmin(low)
-    ax.set_xlim(*window)
-    ax.set_ylim(np.nanmin(low) - 0.05 * span, np.nanmax(high) + 0.05 * span)
+    ax.set(xlim=window, ylim=(np.nanmin(low) - 0.05 * span, np.nanmax(high) + 0.05 * span))
 
 
 def time_window(exemplar: Exemplar, fault_time: float, Ts: float) -> tuple[float, float]:

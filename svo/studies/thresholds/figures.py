@@ -10,7 +10,7 @@ import numpy as np
 
 from svo.plant import HEALTHY
 from svo.store import file_name
-from svo.studies.isolation.figures import STYLE, save_picture
+from svo.studies.drawing import STYLE, new_figure, save_picture
 from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary
@@ -61,12 +61,10 @@ def _pictures(
 
 
 def _times(plant: LearnsDetectors, summaries: Sequence[DetectorSummary]) -> Figure:
-    from matplotlib.figure import Figure
-
     scenarios = list(dict.fromkeys((s.fault, s.profile) for s in summaries))
     columns = min(3, len(scenarios))
     rows = -(-len(scenarios) // columns)
-    figure = Figure(figsize=(3.5 * columns, 2.5 * rows + 0.3), layout="constrained")
+    figure = new_figure(3.5 * columns, 2.5 * rows + 0.3)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, (fault, profile) in zip(axes, scenarios, strict=False):
         plot_times(ax, [s for s in summaries if (s.fault, s.profile) == (fault, profile)])
@@ -97,24 +95,19 @@ def plot_times(ax: Axes, summaries: Sequence[DetectorSummary]) -> list[Any]:
     if paper:
         artists += ax.plot(*zip(*paper, strict=True), "D", ms=5, mfc="none", mec="black", label="paper")
     ax.set_xticks(range(len(detectors)), [d.removeprefix("a = ") for d in detectors])
-    ax.set_xlabel("pole a of the residual filter" if detectors[0].startswith("a = ") else "detector")
-    ax.set_ylabel("delay [s]")
-    ax.set_ylim(bottom=0)
+    what = "pole a of the residual filter" if detectors[0].startswith("a = ") else "detector"
+    ax.set(xlabel=what, ylabel="delay [s]", ylim=(0, None))
     return artists
 
 
 def _assumption(summaries: Sequence[AssumptionSummary], windows: int) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7, 3), layout="constrained")
+    figure = new_figure(7, 3)
     ax = figure.subplots()
     q = np.arange(1, windows + 1)
     for s in summaries:
         share = np.array([s.by_window.get(int(i), 0) / s.runs.of for i in q])
         label = f"{s.records} learning record{'s' * (s.records > 1)}"
         ax.plot(q, 100 * share, color=_COLOURS.get(s.records, "0.4"), label=label)
-    ax.set_xlabel("window length q [samples]")
-    ax.set_ylabel("fault-free runs that\nexceed λ_q [%]")
-    ax.set_ylim(bottom=0)
+    ax.set(xlabel="window length q [samples]", ylabel="fault-free runs that\nexceed λ_q [%]", ylim=(0, None))
     ax.legend()
     return figure

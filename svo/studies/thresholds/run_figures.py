@@ -10,14 +10,13 @@ import numpy as np
 from svo.indices import judge_alarm
 from svo.interval.detector import IntervalRecord
 from svo.plant import HEALTHY, fault_start, first_faulty_sample
-from svo.studies.isolation.figures import STYLE, save_picture
+from svo.studies.drawing import STYLE, new_figure, save_picture
 from svo.studies.isolation.plots import in_seconds
 from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _MEASURED, _BOUNDS, _COMMAND = "#4C9A5B", "#C0392B", "#2B6CA3"
 _HALF_SECONDS = 1.0  # half of a zoom's width in the fault-free run
@@ -46,8 +45,7 @@ def plot_run(ax: Axes, record: IntervalRecord, window: tuple[float, float] | Non
     artists += ax.plot(t, p.lower[shown], color=_BOUNDS, lw=0.9, label="bounds of the prediction")
     artists += ax.plot(t, p.upper[shown], color=_BOUNDS, lw=0.9)
     artists += ax.plot(t, p.u[shown], color=_COMMAND, lw=0.8, ls="--", label="command")
-    ax.set_xlim(begin, end)
-    ax.set_xlabel("time [s]")
+    ax.set(xlim=(begin, end), xlabel="time [s]")
     return artists
 
 
@@ -55,32 +53,25 @@ def _record(plant: LearnsDetectors, fault: str, profile: str, noise: str, seed: 
     """A run seen by the detector with the best pole of the paper's near-steady jam: the last but one."""
     log = plant.simulate(fault, profile, noise, seed)
     learnt = plant.characterise([plant.learning_log(noise, s) for s in np.random.SeedSequence(seed).spawn(5)])
-    detectors = plant.interval_detectors(learnt, float(log.u[0, 0]))
-    return detectors[_chosen(detectors)].run(log)
-
-
-def _chosen(detectors: Any) -> str:
-    names = list(detectors)
-    return str(names[max(0, len(names) - 2)])
+    detectors = list(plant.interval_detectors(learnt, float(log.u[0, 0])).values())
+    return detectors[max(0, len(detectors) - 2)].run(log)
 
 
 def _figure_3(folder: Path, record: IntervalRecord) -> Picture:
-    figure = _figure(7.5, 4.6)
+    figure = new_figure(7.5, 4.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     plot_run(top, record)
-    top.set_xlabel("")
-    top.set_ylabel("position [rad]")
+    top.set(xlabel="", ylabel="position [rad]")
     top.legend(ncols=3, loc="upper right")
     bottom.plot(record.prediction.time, 1e3 * record.prediction.radius, color=_BOUNDS, lw=0.9)
-    bottom.set_ylabel("radius [mrad]")
-    bottom.set_xlabel("time [s]")
+    bottom.set(xlabel="time [s]", ylabel="radius [mrad]")
     text = "As Figure 3 of the paper: the radius grows while the surface moves, and vanishes at rest."
     return save_picture(folder / "run_healthy.png", figure, "Fault-free run", text)
 
 
 def _figure_4(folder: Path, record: IntervalRecord) -> Picture:
     p = record.prediction
-    figure = _figure(7.5, 3.0)
+    figure = new_figure(7.5, 3.0)
     settled = p.time > p.time[0] + 4 * _HALF_SECONDS
     moving = float(p.time[settled][np.argmax(p.radius[settled])])
     average = np.convolve(p.radius, np.ones(201) / 201, "same")
@@ -90,8 +81,7 @@ def _figure_4(folder: Path, record: IntervalRecord) -> Picture:
         figure.subplots(1, 2), (moving, resting), ("while it moves", "near steady state"), strict=True
     ):
         plot_run(ax, record, (middle - _HALF_SECONDS, middle + _HALF_SECONDS))
-        ax.set_title(title)
-        ax.set_ylabel("position [rad]")
+        ax.set(title=title, ylabel="position [rad]")
     figure.axes[0].legend()
     text = "As Figure 4: the same run where the radius is largest, and where it is smallest."
     return save_picture(folder / "run_zoom.png", figure, "Zoom of the fault-free run", text)
@@ -99,7 +89,7 @@ def _figure_4(folder: Path, record: IntervalRecord) -> Picture:
 
 def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Picture:
     scenarios = list(plant.detection_reference)
-    figure = _figure(8.5, 2.5 * len(scenarios))
+    figure = new_figure(8.5, 2.5 * len(scenarios))
     for (fault, profile), (wide, near) in zip(
         scenarios, figure.subplots(len(scenarios), 2, squeeze=False), strict=True
     ):
@@ -112,8 +102,7 @@ def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Pi
         margin = 0.6 * (end - start) + 0.1
         plot_run(wide, record)
         plot_run(near, record, (start - margin, end + margin))
-        wide.set_title(plant.label(fault, profile))
-        wide.set_ylabel("position [rad]")
+        wide.set(title=plant.label(fault, profile), ylabel="position [rad]")
         for ax in (wide, near):
             ax.axvline(start, color="0.4", lw=0.9, ls=":", label="fault")
             if alarm is not None:
@@ -123,9 +112,3 @@ def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Pi
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     text = "As Figure 5: the whole run, and the time from fault to alarm (pole of the last filter but one)."
     return save_picture(folder / "run_faults.png", figure, "Runs with faults", text)
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
