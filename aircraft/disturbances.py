@@ -5,16 +5,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import butter, sosfilt
 
-from svo.checks import Array
+from svo.checks import Array, expect, expect_one_of
+from svo.plant import Distribution
 
 RMS_PER_BOUND = 1 / 2.5
-Distribution = Literal["bounded", "gaussian"]
 _SETTLING_PERIODS = 6.0  # of the cut-off: a second-order Butterworth has decayed by exp(-27) then
 
 
@@ -47,18 +47,15 @@ class BandLimitedNoise:
     distribution: Distribution = "bounded"
 
     def __post_init__(self) -> None:
-        if self.distribution not in ("bounded", "gaussian"):
-            raise ValueError(f"distribution is {self.distribution!r}; expected 'bounded' or 'gaussian'")
+        expect_one_of("distribution", self.distribution, get_args(Distribution))
         bounds, cutoffs = np.array(self.bounds, dtype=float), np.array(self.cutoffs_hz, dtype=float)
         if bounds.ndim != 1 or bounds.shape != cutoffs.shape:
             shapes = f"bounds has shape {bounds.shape} and cutoffs_hz {cutoffs.shape}"
             raise ValueError(f"{shapes}; expected one value a channel in both")
-        if not (bounds >= 0).all() or not np.isfinite(bounds).all():
-            raise ValueError(f"bounds is {bounds}; expected finite half-widths >= 0")
-        if not self.Ts > 0:
-            raise ValueError(f"Ts is {self.Ts}; expected a positive sampling time in seconds")
-        if not ((cutoffs > 0) & (cutoffs < 0.5 / self.Ts)).all():
-            raise ValueError(f"cutoffs_hz is {cutoffs}; expected frequencies in (0, {0.5 / self.Ts}) Hz")
+        expect((bounds >= 0).all() and np.isfinite(bounds).all(), "bounds", bounds, "finite half-widths >= 0")
+        expect(self.Ts > 0, "Ts", self.Ts, "a positive sampling time in seconds")
+        highest = 0.5 / self.Ts
+        expect(((cutoffs > 0) & (cutoffs < highest)).all(), "cutoffs_hz", cutoffs, f"frequencies in (0, {highest}) Hz")
         object.__setattr__(self, "bounds", bounds)
         object.__setattr__(self, "cutoffs_hz", cutoffs)
 

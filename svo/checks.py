@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from importlib import import_module
 from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes import HPolytope
 from polytopes.checks import Shape, listed, real_array, real_number, whole_number
 
 __all__ = [
     "Array",
+    "bounded_box",
     "check_disturbance_box",
     "check_noise",
+    "expect",
+    "expect_one_of",
     "finite_array",
     "floats",
     "is_count",
@@ -24,10 +29,31 @@ __all__ = [
     "readings",
     "real_array",
     "real_number",
+    "sizes",
     "whole_number",
 ]
 
 Array = NDArray[np.float64]
+
+
+def expect(holds: object, name: str, value: Any, what: str) -> None:
+    """Refuse the value of an argument unless something holds; ``what`` was expected instead."""
+    if not holds:
+        shown = repr(value) if isinstance(value, str) else value
+        raise ValueError(f"{name} is {shown}; expected {what}")
+
+
+def expect_one_of(name: str, value: Any, choices: Collection[str]) -> None:
+    """Refuse what is none of some words."""
+    expect(value in choices, name, value, f"one of {', '.join(choices)}")
+
+
+def sizes(name: str, value: Any, count: int) -> Array:
+    """So many finite numbers >= 0, such as half-widths."""
+    array = np.array(value, dtype=float)
+    fits = array.shape == (count,) and np.isfinite(array).all() and (array >= 0).all()
+    expect(fits, name, array, f"{count} finite numbers >= 0")
+    return array
 
 
 def finite_array(name: str, value: Any, *shapes: Shape, meaning: str = "") -> Array:
@@ -53,8 +79,7 @@ def floats(name: str, value: Any, *, missing: bool = False) -> Array:
 
 def positive_number(name: str, value: Any, what: str) -> float:
     """One finite number above zero; ``what`` says which, for the error."""
-    if not (is_finite_number(value) and value > 0):
-        raise ValueError(f"{name} is {value!r}; expected a positive {what}")
+    expect(is_finite_number(value) and value > 0, name, value, f"a positive {what}")
     return float(value)
 
 
@@ -93,6 +118,20 @@ def check_noise(noise: Array, ny: int) -> None:
         raise ValueError(f"n has shape {noise.shape}; expected ({ny},), one half-width a sensor")
     if not np.isfinite(noise).all() or (noise < 0).any():
         raise ValueError(f"n is {noise}; expected finite half-widths >= 0")
+
+
+def bounded_box(name: str, P: HPolytope, dimension: int) -> tuple[Array, Array]:
+    """Bounds of a set that must have a point and be bounded."""
+    if not isinstance(P, HPolytope):
+        raise TypeError(f"{name} is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
+    if P.dim != dimension:
+        raise ValueError(f"{name} has dimension {P.dim}; expected {dimension}")
+    if P.emptiness().status != "nonempty":
+        raise ValueError(f"{name} is empty, or not surely nonempty; expected a bounded set with a point")
+    lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
+    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+        raise ValueError(f"{name} is unbounded; expected a bounded set, such as a box as large as the values can be")
+    return lower, upper
 
 
 def optional_import(module: str, extra: str, what: str) -> Any:

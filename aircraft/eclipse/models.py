@@ -23,7 +23,7 @@ from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.schedule import ScheduledBlocks
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import gust_directions, level_trim, output_matrix
-from svo.checks import Array
+from svo.checks import Array, sizes
 from svo.models.discretisation import zero_order_hold
 from svo.models.model import UncertainModel, Uncertainty
 
@@ -55,10 +55,7 @@ class MismatchBounds:
 
     def __post_init__(self) -> None:
         for name in ("state", "output"):
-            array = np.array(getattr(self, name), dtype=float)
-            if array.shape != (4,) or not np.isfinite(array).all() or (array < 0).any():
-                raise ValueError(f"{name} is {array}; expected four finite half-widths >= 0")
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, sizes(name, getattr(self, name), 4))
 
 
 def read_bounds() -> Mapping[str, Mapping[str, MismatchBounds]]:

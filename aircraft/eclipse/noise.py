@@ -28,8 +28,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from aircraft.disturbances import BandLimitedNoise, Distribution
+from aircraft.disturbances import BandLimitedNoise
 from svo.checks import Array
+from svo.plant import Distribution
 
 SENSOR_CUTOFF_HZ = 20.0
 GUST_CUTOFFS_HZ = (0.5, 1.0, 2.0)  # d_u, d_w, d_q

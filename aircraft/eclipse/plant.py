@@ -16,7 +16,7 @@ from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
-from svo.checks import Array
+from svo.checks import Array, expect, expect_one_of
 from svo.faults import SensorFault
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
@@ -116,8 +116,7 @@ class Eclipse:
     )
 
     def __post_init__(self) -> None:
-        if self.architecture not in ("I", "II"):
-            raise ValueError(f"architecture is {self.architecture!r}; expected 'I' or 'II'")
+        expect(self.architecture in ("I", "II"), "architecture", self.architecture, "'I' or 'II'")
 
     def duration(self, fault: str, profile: str) -> float:
         """Length of a run [s]; ``fault`` may be "none"."""
@@ -130,8 +129,7 @@ class Eclipse:
 
     def models(self, noise: str) -> dict[str, UncertainModel]:
         """The observers' models: "nominal", then one for each fault, which contains the healthy aircraft."""
-        if noise not in NOISE_SETS:
-            raise ValueError(f"noise is {noise!r}; expected one of {', '.join(NOISE_SETS)}")
+        expect_one_of("noise", noise, NOISE_SETS)
         bounds, scheduled = self.bounds[noise], self.scenarios.model
         models = {"nominal": scheduled.model(noise, bounds["nominal"])}
         for name in self.faults:

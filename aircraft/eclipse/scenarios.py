@@ -10,7 +10,6 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from aircraft.disturbances import Distribution
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, design_autopilot
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.models import SPEED_MOMENT_INCREASE, ScheduledModel
@@ -18,8 +17,9 @@ from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.simulator import Controller, Corruption, Flight, Surrogate, fly
 from aircraft.eclipse.trim import level_trim
-from svo.checks import Array
+from svo.checks import Array, expect, expect_one_of
 from svo.faults import ActuatorFault, PlantFault, Profile, Ramp, SensorFault, Step
+from svo.plant import Distribution
 
 Fault = SensorFault | ActuatorFault | PlantFault
 
@@ -80,8 +80,7 @@ class Scenarios:
     distribution: Distribution = "bounded"
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.size <= 1.0:
-            raise ValueError(f"size is {self.size}; expected a fraction of the paper's faults, 0 < size <= 1")
+        expect(0.0 < self.size <= 1.0, "size", self.size, "a fraction of the paper's faults, 0 < size <= 1")
 
     def fault(self, name: str, profile: str) -> Fault:
         """The fault object that both corrupts a flight and gives its observer's model.
@@ -91,8 +90,7 @@ class Scenarios:
         ValueError
             If the fault or the profile is not one of the scenarios.
         """
-        if profile not in PROFILES:
-            raise ValueError(f"profile is {profile!r}; expected one of {', '.join(PROFILES)}")
+        expect_one_of("profile", profile, PROFILES)
         shape = PROFILES[profile][0]
         if name == "alpha":
             return SensorFault(ALPHA, "bias", self.size * ALPHA_BIAS[profile], shape)
@@ -168,6 +166,5 @@ def _autopilot(noise: str, Ts: float, surrogate: Surrogate) -> Controller:
 
 
 def _known(noise: str) -> str:
-    if noise not in NOISE_SETS:
-        raise ValueError(f"noise is {noise!r}; expected one of {', '.join(NOISE_SETS)}")
+    expect_one_of("noise", noise, NOISE_SETS)
     return noise

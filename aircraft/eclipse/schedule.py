@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array
+from svo.checks import Array, expect_one_of
 from svo.models.schedule_table import ScheduleTable
 
 FILTER_TIME_S = 0.5
@@ -95,6 +95,5 @@ class ScheduledBlocks:
 
     def block(self, name: str) -> ScheduleTable:
         """One block as a function of the schedule."""
-        if name not in self.tables:
-            raise ValueError(f"name is {name!r}; expected one of {', '.join(self.tables)}")
+        expect_one_of("name", name, self.tables)
         return ScheduleTable(self._flat.points, self.tables[name])

@@ -22,7 +22,7 @@ from aircraft.missile.airframe import Airframe
 from aircraft.missile.imu import SensorErrors
 from aircraft.missile.redundancy import DL, DM, DN, TRAVEL, ForceBalance
 from aircraft.missile.simulator import ACCELERATION, VELOCITY, dynamic_pressure, force_coefficients
-from svo.checks import Array
+from svo.checks import Array, expect
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,7 @@ class ModelError:
     coefficients: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.coefficients) and self.coefficients >= 0):
-            raise ValueError(f"coefficients is {self.coefficients}; expected a relative error >= 0")
+        expect(0 <= self.coefficients < np.inf, "coefficients", self.coefficients, "a relative error >= 0")
 
     def imbalance_bounds(self, y: ArrayLike, airframe: Airframe, travel: ArrayLike = TRAVEL) -> Array:
         """Bounds (K, 3) of |d_i| [m/s^2], from measurements (K, 15).

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from svo.checks import Array
+from svo.checks import Array, expect
 
 GRAVITY = 9.81
 DEFLECTION_LIMIT = float(np.radians(28.0))
@@ -91,8 +91,7 @@ class Airframe:
         if not np.isfinite(values).all():
             raise ValueError(f"{fields(self)[int(np.argmin(np.isfinite(values)))].name} is not a finite number")
         for name in ("mass", "roll_inertia", "pitch_inertia", "reference_area", "reference_length", "scale_height"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} is {getattr(self, name)}; expected a positive number")
+            expect(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
         if not 0 <= self.thrust_min < self.thrust_max:
             raise ValueError(
                 f"thrust is from {self.thrust_min} to {self.thrust_max}; expected 0 <= thrust_min < thrust_max"
@@ -110,8 +109,7 @@ class Airframe:
         ValueError
             If ``relative`` is not in [0, 1).
         """
-        if not 0 <= relative < 1:
-            raise ValueError(f"relative is {relative}; expected a bound on the relative error, 0 <= relative < 1")
+        expect(0 <= relative < 1, "relative", relative, "a bound on the relative error, 0 <= relative < 1")
         errors = rng.uniform(-relative, relative, len(FORCE_COEFFICIENTS))
         changed = {n: getattr(self, n) * (1.0 + float(e)) for n, e in zip(FORCE_COEFFICIENTS, errors, strict=True)}
         return replace(self, **changed)

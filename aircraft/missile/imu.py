@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from svo.checks import Array
+from svo.checks import Array, expect_one_of, sizes
 
 Distribution = Literal["uniform", "gaussian"]
 
@@ -45,15 +45,9 @@ class SensorErrors:
     sigma: Array = field(default_factory=lambda: _per_group(0.05, 1e-3, 0.5, 0.05, 2e-4))
 
     def __post_init__(self) -> None:
-        if self.distribution not in get_args(Distribution):
-            raise ValueError(
-                f"distribution is {self.distribution!r}; expected one of {', '.join(get_args(Distribution))}"
-            )
+        expect_one_of("distribution", self.distribution, get_args(Distribution))
         for name in ("scale", "bias", "sigma"):
-            array = np.array(getattr(self, name), dtype=float)
-            if array.shape != (15,) or not np.isfinite(array).all() or (array < 0).any():
-                raise ValueError(f"{name} is {array}; expected 15 finite numbers >= 0, one a measurement")
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, sizes(name, getattr(self, name), 15))
 
     @classmethod
     def none(cls) -> SensorErrors:

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from aircraft.missile.airframe import INPUTS, Airframe
 from aircraft.missile.imu import SensorErrors
 from aircraft.missile.redundancy import ForceBalance
-from svo.checks import Array
+from svo.checks import Array, expect, sizes
 from svo.models.model import UncertainModel
 
 BOUNDS_FILE = "bounds.toml"
@@ -64,10 +64,7 @@ class MismatchBounds:
 
     def __post_init__(self) -> None:
         for name in ("force", "velocity", "output"):
-            array = np.array(getattr(self, name), dtype=float)
-            if array.shape != (3,) or not np.isfinite(array).all() or (array < 0).any():
-                raise ValueError(f"{name} is {array}; expected three finite half-widths >= 0")
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, sizes(name, getattr(self, name), 3))
 
 
 def read_bounds() -> Mapping[str, Mapping[str, MismatchBounds]]:
@@ -161,8 +158,8 @@ class Embedding:
         return blocks
 
     def _blocks(self, schedule: Array) -> dict[str, Array]:
-        if schedule.shape[1:] != TYPICAL.shape or not np.isfinite(schedule).all():
-            raise ValueError(f"schedule is {schedule}; expected {TYPICAL.size} finite measurements a sample")
+        fits = schedule.shape[1:] == TYPICAL.shape and np.isfinite(schedule).all()
+        expect(fits, "schedule", schedule, f"{TYPICAL.size} finite measurements a sample")
         parts = self.over(schedule)
         D, c = np.zeros((len(schedule), len(OUTPUTS), N_INPUTS)), np.zeros((len(schedule), len(OUTPUTS)))
         D[:, 3:, : len(INPUTS)], c[:, 3:] = parts["G"], parts["h"]

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aircraft.missile.airframe import INPUT_LOWER, INPUT_UPPER, INPUTS, Airframe
 from aircraft.missile.simulator import ACCELERATION, VELOCITY, dynamic_pressure, force_coefficients
-from svo.checks import Array
+from svo.checks import Array, expect_one_of
 
 DL, DM, DN, ETA = range(4)
 TRAVEL = np.maximum(np.abs(INPUT_LOWER), np.abs(INPUT_UPPER))
@@ -197,8 +197,7 @@ def moving_mean(values: Array, samples: int) -> Array:
 
 def known_residual(name: str) -> Residual:
     """The residual of that name; ValueError if there is none."""
-    if name not in RESIDUALS:
-        raise ValueError(f"residual is {name!r}; expected one of {', '.join(RESIDUALS)}")
+    expect_one_of("residual", name, RESIDUALS)
     return RESIDUALS[name]
 
 

@@ -21,7 +21,7 @@ from aircraft.missile.isolability import isolability_table
 from aircraft.missile.redundancy import TABLE_1, moving_mean, residuals, signature_matrix
 from aircraft.missile.scenarios import DM, DN, SCENARIOS, TS, Flights, Run, Scenario, locked, noise_set, thrust_loss
 from aircraft.missile.sequence import isolate_in_order
-from svo.checks import Array
+from svo.checks import Array, expect
 from svo.indices import first_true, judge_alarm
 from svo.plant import AddedStudy
 from svo.store import write_csv, write_text
@@ -139,8 +139,7 @@ def scenario_study(runs: int, seed: int, noises: Sequence[str], flights: Flights
     ValueError
         If ``runs`` is below one, or a noise set is not known.
     """
-    if runs < 1:
-        raise ValueError(f"runs is {runs}; expected at least 1")
+    expect(runs >= 1, "runs", runs, "at least 1")
     for noise in noises:
         noise_set(noise)
     simulator = Flights() if flights is None else flights

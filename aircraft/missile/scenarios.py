@@ -11,7 +11,7 @@ import numpy as np
 from aircraft.missile.airframe import DEFLECTION_LIMIT, INPUT_LOWER, INPUT_UPPER, INPUTS, Airframe
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
 from aircraft.missile.simulator import Corruption, Flight, Guidance, fly
-from svo.checks import Array
+from svo.checks import Array, expect_one_of
 from svo.faults import ActuatorFault, SensorFault, Step
 
 Fault = ActuatorFault | SensorFault
@@ -161,8 +161,7 @@ def noise_set(name: str) -> SensorErrors:
     ValueError
         If there are none of that name.
     """
-    if name not in NOISE_SETS:
-        raise ValueError(f"noise is {name!r}; expected one of {', '.join(NOISE_SETS)}")
+    expect_one_of("noise", name, NOISE_SETS)
     return NOISE_SETS[name]
 
 

@@ -17,10 +17,9 @@ from polytopes.signatures import options_by_name
 from svo.analysis.elastic_bounds import Bound, bounds_of
 from svo.analysis.elastic_program import ElasticProgram, Explained
 from svo.analysis.explanation import NEGLIGIBLE, explain
-from svo.analysis.lifted_rows import bounding_box
 from svo.analysis.trajectory import Trajectory
-from svo.checks import Array, is_count
-from svo.logs.log import Log
+from svo.checks import Array, bounded_box, expect, is_count
+from svo.logs.log import Log, expect_log
 from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import NormalForm
 
@@ -121,10 +120,9 @@ def calibrate(
     RuntimeError
         If the solver leaves a program undecided, or the trajectory found cannot be proven one.
     """
-    if not is_count(window, 2):
-        raise ValueError(f"window is {window!r}; expected a number of samples >= 2")
+    expect(is_count(window, 2), "window", window, "a number of samples >= 2")
     _check_log(model, log)
-    form = NormalForm.at(model, *bounding_box("initial", initial, model.n_states))
+    form = NormalForm.at(model, *bounded_box("initial", initial, model.n_states))
     chosen = bounds_of(form, bounds)
     amounts = np.zeros(len(chosen))
     pieces, first, start = list[_Piece](), 0, initial
@@ -207,10 +205,7 @@ def _no_explanation(chosen: Sequence[Bound], first: int, count: int, is_exact: b
 
 def _check_log(model: UncertainModel, log: Log) -> None:
     expect_model("model", model)
-    if not isinstance(log, Log):
-        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log")
-    if len(log) == 0:
-        raise ValueError("log has no samples; expected at least one")
+    expect_log(log)
     for name, count in (("u", model.n_inputs), ("y", model.n_outputs)):
         array = getattr(log, name)
         if array.shape[1] != count:

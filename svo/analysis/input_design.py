@@ -23,7 +23,7 @@ from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.model_pair import LEAST_SEPARATION, ModelPair
-from svo.checks import Array, finite_array, is_count, is_finite_number, listed
+from svo.checks import Array, expect, finite_array, is_count, is_finite_number, listed
 from svo.models.model import UncertainModel, expect_model
 
 _ROUNDS = 60
@@ -327,10 +327,9 @@ def _sets(given: HPolytope | Sequence[HPolytope] | None, initial: HPolytope, cou
 
 def _check_numbers(horizon: int, hold: int, margin: float) -> None:
     for name, value in (("horizon", horizon), ("hold", hold)):
-        if not is_count(value, 1):
-            raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1")
-    if not (is_finite_number(margin) and margin > LEAST_SEPARATION):
-        raise ValueError(f"margin is {margin}; expected a separation above {LEAST_SEPARATION:g} noise widths")
+        expect(is_count(value, 1), name, value, "a number of samples >= 1")
+    enough = is_finite_number(margin) and margin > LEAST_SEPARATION
+    expect(enough, "margin", margin, f"a separation above {LEAST_SEPARATION:g} noise widths")
 
 
 def _reference(reference: ArrayLike | None, horizon: int, count: int) -> Array:
@@ -366,6 +365,6 @@ def _limits(limits: tuple[ArrayLike, ArrayLike], reference: Array) -> tuple[Arra
 
 def _weight(weight: ArrayLike | None, count: int) -> Array:
     values = np.ones(count) if weight is None else finite_array("weight", weight)
-    if values.shape != (count,) or (values <= 0).any():
-        raise ValueError(f"weight is {weight!r}; expected {count} positive numbers, one an input")
+    fits = values.shape == (count,) and (values > 0).all()
+    expect(fits, "weight", weight, f"{count} positive numbers, one an input")
     return values

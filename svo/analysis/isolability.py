@@ -12,7 +12,7 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.analysis.distinguish import Distinguishability, distinguishability
-from svo.checks import Array
+from svo.checks import Array, expect
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.model import UncertainModel
@@ -123,10 +123,8 @@ class FaultFreeFlight:
         """
         log = plant.simulate(HEALTHY, HEALTHY, noise, seed)
         first = int(np.searchsorted(log.time, plant.fault_time - plant.Ts / 2))
-        if not 1 <= horizon <= len(log) - first:
-            raise ValueError(
-                f"horizon is {horizon}; expected 1 to {len(log) - first}, the samples of a flight from the fault on"
-            )
+        most = len(log) - first
+        expect(1 <= horizon <= most, "horizon", horizon, f"1 to {most}, the samples of a flight from the fault on")
         observers = plant.bank(noise).observers
         return cls(
             u=log.u[first:],

@@ -128,17 +128,3 @@ def set_rows(program: SparseProgram, columns: Columns, P: HPolytope) -> None:
         program.rows([(columns, P.A)], -np.inf, P.b)
     if len(P.d):
         program.rows([(columns, P.C)], P.d, P.d)
-
-
-def bounding_box(name: str, P: HPolytope, dimension: int) -> tuple[Array, Array]:
-    """The finite box of a set, or an error that names the argument."""
-    if not isinstance(P, HPolytope):
-        raise TypeError(f"{name} is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
-    if P.dim != dimension:
-        raise ValueError(f"{name} has dimension {P.dim}; expected {dimension}")
-    if P.emptiness().status != "nonempty":
-        raise ValueError(f"{name} is empty, or not surely nonempty; expected a bounded set with a point")
-    lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
-    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        raise ValueError(f"{name} is unbounded; expected a bounded set, such as a box")
-    return lower, upper

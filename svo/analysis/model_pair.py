@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
-from svo.analysis.lifted_rows import LiftedSample, bounding_box, evaluate_with_rest, line_rows, set_rows
+from svo.analysis.lifted_rows import LiftedSample, evaluate_with_rest, line_rows, set_rows
 from svo.analysis.reachable_set import ReachableSet, product_bounds
 from svo.analysis.sparse_program import Columns, Solution, SparseProgram
-from svo.checks import Array, finite_array, is_count
+from svo.checks import Array, bounded_box, expect, finite_array, is_count
 from svo.models.model import UncertainModel, expect_model
 from svo.models.normal_form import Integers, NormalForm, exponents_of, set_in
 
@@ -67,8 +67,7 @@ class ModelPair:
     ) -> None:
         expect_model("plant_model", plant)
         expect_model("observer_model", observer)
-        if not is_count(horizon, 1):
-            raise ValueError(f"horizon is {horizon!r}; expected a number of samples >= 1")
+        expect(is_count(horizon, 1), "horizon", horizon, "a number of samples >= 1")
         if (plant.n_inputs, plant.n_outputs) != (observer.n_inputs, observer.n_outputs):
             raise ValueError(
                 f"observer_model has {observer.n_inputs} inputs and {observer.n_outputs} outputs; expected "
@@ -77,7 +76,7 @@ class ModelPair:
         if plant.Ts != observer.Ts:
             raise ValueError(f"observer_model has Ts = {observer.Ts} s; expected {plant.Ts} s, as plant_model has")
         boxes = [
-            bounding_box(name, P, m.n_states)
+            bounded_box(name, P, m.n_states)
             for name, P, m in (("initial", initial, plant), ("observer_initial", observer_initial, observer))
         ]
         shared = exponents_of(plant, *boxes[0])
@@ -299,7 +298,7 @@ def _schedules(schedule: ArrayLike | None, horizon: int, needed: bool) -> list[A
 def _inputs(u: ArrayLike | HPolytope | None, horizon: int, count: int) -> tuple[Array, Array]:
     """Lower and upper bounds (horizon, nu) of the inputs."""
     if isinstance(u, HPolytope):
-        lower, upper = bounding_box("u", u, count)
+        lower, upper = bounded_box("u", u, count)
         return np.tile(lower, (horizon, 1)), np.tile(upper, (horizon, 1))
     if u is None:
         if count:

@@ -8,6 +8,7 @@ from numba import njit
 
 _IMPOSSIBLE = 1e300  # half a squared innovation, in variances: so far off that only floats end there
 
+
 @njit(cache=True)
 def filter_samples(x, P, first, A, f, Q, C, g, R, y, E, D, states, white):  # type: ignore[no-untyped-def]
     """Kalman filter over samples, with unknown inputs decoupled (Kitanidis 1987) where E and D have columns.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes.signatures import options_by_name
 from svo.baselines.filter_kernel import filter_samples
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, Sample
-from svo.checks import Array, finite_array, readings
+from svo.checks import Array, finite_array, positive_number, readings
 from svo.logs.log import Log
 
 _STABLE = 1e-9  # how far inside the unit circle a mode must be to count as stable
@@ -76,8 +76,7 @@ class InnovationFilter:
     _D: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.process_noise) and self.process_noise > 0):
-            raise ValueError(f"process_noise is {self.process_noise}; expected a positive factor")
+        positive_number("process_noise", self.process_noise, "factor")
         n, ny = self.model.model.n_states, self.model.model.n_outputs
         E, D = _columns("state_input", self.state_input, n), _columns("output_input", self.output_input, ny)
         none = (np.zeros((n, D.shape[1])), np.zeros((ny, E.shape[1])))

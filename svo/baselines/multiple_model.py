@@ -10,7 +10,7 @@ import numpy as np
 from polytopes.signatures import options_by_name
 from svo.baselines.filter_kernel import multiple_models
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
-from svo.checks import Array
+from svo.checks import Array, expect, positive_number
 from svo.logs.log import Log
 
 
@@ -52,10 +52,8 @@ class MultipleModelFilter:
     def __post_init__(self) -> None:
         if len(self.models) < 2:
             raise ValueError(f"models has {len(self.models)}; expected at least two, the first without a fault")
-        if not 0 <= self.switching < 1:
-            raise ValueError(f"switching is {self.switching}; expected a probability in [0, 1)")
-        if not (np.isfinite(self.process_noise) and self.process_noise > 0):
-            raise ValueError(f"process_noise is {self.process_noise}; expected a positive factor")
+        expect(0 <= self.switching < 1, "switching", self.switching, "a probability in [0, 1)")
+        positive_number("process_noise", self.process_noise, "factor")
 
     @property
     def transition(self) -> Array:

@@ -7,14 +7,12 @@ from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from polytopes.signatures import options_by_name
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
-from svo.checks import is_count
+from svo.checks import Array, expect, is_count, positive_number
 from svo.logs.log import Log
 
-Array = NDArray[np.float64]
 _TRACE = 1e-12  # of a squared norm
 
 
@@ -65,12 +63,10 @@ class ParitySpace:
     process_noise: float = 1.0
 
     def __post_init__(self) -> None:
-        if not is_count(self.order, 1):
-            raise ValueError(f"order is {self.order!r}; expected a whole number of transitions >= 1")
+        expect(is_count(self.order, 1), "order", self.order, "a whole number of transitions >= 1")
         if self.degrees < 1:
             raise ValueError(f"order is {self.order}: (order + 1) ny is not above n; expected a longer window")
-        if not (np.isfinite(self.process_noise) and self.process_noise > 0):
-            raise ValueError(f"process_noise is {self.process_noise}; expected a positive factor")
+        positive_number("process_noise", self.process_noise, "factor")
 
     @property
     def degrees(self) -> int:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from svo.checks import expect_one_of
 from svo.cli.destinations import writable_csv, writable_folder
 from svo.cli.frame import (
     KEPT,
@@ -171,8 +172,7 @@ def compare(
         the_plant = plant_to_simulate(plant)
         noise = chosen_noise(the_plant, noise)
         for name in distribution or ():
-            if name not in DISTRIBUTIONS:
-                raise ValueError(f"distribution is {name!r}; expected one of {', '.join(DISTRIBUTIONS)}")
+            expect_one_of("distribution", name, DISTRIBUTIONS)
         chosen = tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS))
         comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
         if healthy_runs is not None:

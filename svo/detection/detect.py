@@ -17,7 +17,7 @@ from svo.isolation.alarms import Alarm, write_alarms
 from svo.isolation.record import BankRecord, Recorder
 from svo.logs.columns import check_times
 from svo.logs.drive import drive
-from svo.logs.log import Log
+from svo.logs.log import Log, expect_log
 from svo.models.digest import model_digest
 from svo.observers.base import Certificate, Observer
 from svo.plant import MonitoredPlant, architecture_of, schedule_of
@@ -97,10 +97,7 @@ class Detection:
 def check_log(plant: MonitoredPlant, log: Log) -> None:
     """Raise an error if a log is not one of a plant: its channels, and its sampling time within 1 %."""
     expect_plant(plant)
-    if not isinstance(log, Log):
-        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.logs.file.read_log gives")
-    if len(log) == 0:
-        raise ValueError("log has no samples; expected at least one")
+    expect_log(log)
     replace(log, x=None).to_columns(plant.columns)
     check_times(log.time, plant.Ts, lambda k: f"log, sample {k}")
 

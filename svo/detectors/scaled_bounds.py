@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from svo.checks import expect
 from svo.faults.blocks import disturbance_edges, mapped, with_noise
 from svo.models.model import UncertainModel
 
@@ -20,8 +21,7 @@ def scaled_bounds(model: UncertainModel, scale: float) -> UncertainModel:
     ValueError
         If the scale is not positive.
     """
-    if not (np.isfinite(scale) and scale > 0):
-        raise ValueError(f"scale is {scale}; expected a positive number, 1 for the bounds as stated")
+    expect(np.isfinite(scale) and scale > 0, "scale", scale, "a positive number, 1 for the bounds as stated")
     if scale == 1.0:
         return model
     return model.replace(w=_disturbances(model, scale), n=with_noise(model, lambda noise: scale * noise))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, finite_array, is_count, is_finite_number
+from svo.checks import Array, expect, expect_one_of, finite_array, is_count, is_finite_number, positive_number
 from svo.faults.blocks import (
     channels,
     check_channels,
@@ -111,20 +111,17 @@ class ActuatorFault:
     def __post_init__(self) -> None:
         channels(self.where)
         check_profile(self.profile)
-        if self.kind not in get_args(ActuatorKind):
-            raise ValueError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(ActuatorKind))}")
+        expect_one_of("kind", self.kind, get_args(ActuatorKind))
         self._check_magnitude()
         self._check_given("travel", _NEEDS_TRAVEL)
         self._check_given("frequency_hz", _NEEDS_FREQUENCY)
         self._check_given("seed", ("noise",))
-        if self.seed is not None and not is_count(self.seed, 0):
-            raise ValueError(f"seed is {self.seed!r}; expected an integer >= 0")
+        expect(self.seed is None or is_count(self.seed, 0), "seed", self.seed, "an integer >= 0")
         if self.travel is not None:
             lower, upper = finite_array("travel", self.travel, (2,), meaning="(lower, upper)")
-            if not lower < upper:
-                raise ValueError(f"travel is {self.travel}; expected finite (lower, upper) with lower < upper")
-        if self.frequency_hz is not None and not (is_finite_number(self.frequency_hz) and self.frequency_hz > 0):
-            raise ValueError(f"frequency_hz is {self.frequency_hz}; expected a positive number")
+            expect(lower < upper, "travel", self.travel, "finite (lower, upper) with lower < upper")
+        if self.frequency_hz is not None:
+            positive_number("frequency_hz", self.frequency_hz, "number")
         if self.kind == "runaway" and not isinstance(self.profile, Step):
             raise ValueError(f"profile is {self.profile}; a runaway moves at its own rate, so give it a Step")
 
@@ -314,10 +311,10 @@ class ActuatorFault:
             return
         if not is_finite_number(self.magnitude):
             raise ValueError(f"magnitude is {self.magnitude}; {self.kind} needs a finite number")
-        if self.kind == "loss" and not 0 < self.magnitude <= 1:
-            raise ValueError(f"magnitude is {self.magnitude}; expected the lost fraction, 0 < magnitude <= 1")
-        if self.kind in (*_NEEDS_FREQUENCY, "noise") and self.magnitude <= 0:
-            raise ValueError(f"magnitude is {self.magnitude}; expected an amplitude > 0")
+        if self.kind == "loss":
+            expect(0 < self.magnitude <= 1, "magnitude", self.magnitude, "the lost fraction, 0 < magnitude <= 1")
+        if self.kind in (*_NEEDS_FREQUENCY, "noise"):
+            expect(self.magnitude > 0, "magnitude", self.magnitude, "an amplitude > 0")
         if self.kind == "runaway" and self.magnitude == 0:
             raise ValueError("magnitude is 0; expected the rate of the runaway per second (use locking for none)")
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from polytopes import HPolytope
-from svo.checks import Array, finite_array, floats, is_count
+from svo.checks import Array, expect, finite_array, floats, is_count
 from svo.models.model import Schedulable, UncertainModel, Uncertainty
 from svo.models.schedule_table import ScheduleTable, values_over
 
@@ -121,10 +121,8 @@ def channels(where: Any) -> tuple[int, ...]:
     """``where`` of a fault as a tuple of indices, checked."""
     indices = where if isinstance(where, tuple) else (where,)
     for index in indices:
-        if not is_count(index, 0):
-            raise ValueError(f"where is {where!r}; expected the index of a channel (>= 0) or a tuple of such indices")
-    if not indices or len(set(indices)) != len(indices):
-        raise ValueError(f"where is {where!r}; expected at least one channel, each once")
+        expect(is_count(index, 0), "where", where, "the index of a channel (>= 0) or a tuple of such indices")
+    expect(indices and len(set(indices)) == len(indices), "where", where, "at least one channel, each once")
     return tuple(int(i) for i in indices)
 
 

@@ -58,7 +58,6 @@ class FaultPair:
         return replace(second, travel=first.reach(second.travel))
 
 
-
 def pairs(faults: Mapping[str, Fault]) -> dict[str, FaultPair]:
     """All pairs of simultaneous faults, named "first + second", in the order of ``faults``.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array, finite_array, is_finite_number
+from svo.checks import Array, expect, finite_array, is_finite_number
 from svo.faults.profiles import Profile, check_profile
 from svo.models.model import UncertainModel, Uncertainty
 
@@ -43,8 +43,8 @@ class PlantFault:
         if not isinstance(self.direction, Uncertainty):
             raise TypeError(f"direction is a {type(self.direction).__name__}; expected an Uncertainty")
         check_profile(self.profile)
-        if not is_finite_number(self.magnitude) or self.magnitude == 0:
-            raise ValueError(f"magnitude is {self.magnitude}; expected a finite number, not zero")
+        is_usable = is_finite_number(self.magnitude) and self.magnitude != 0
+        expect(is_usable, "magnitude", self.magnitude, "a finite number, not zero")
 
     def delta(self, t: ArrayLike) -> Array:
         """Delta of the fault at times t [s], of the shape of t."""

@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import Array, finite_array, is_finite_number, readings, real_array
+from svo.checks import Array, expect, finite_array, is_finite_number, readings, real_array
 
 EDGE_TOLERANCE_S = 1e-9
 
@@ -89,8 +89,7 @@ class Intermittent:
     def __post_init__(self) -> None:
         _check_finite("start", self.start)
         _check_positive("period", self.period)
-        if not 0 < self.duty < 1:
-            raise ValueError(f"duty is {self.duty}; expected a fraction of the period strictly between 0 and 1")
+        expect(0 < self.duty < 1, "duty", self.duty, "a fraction of the period strictly between 0 and 1")
 
     def value(self, t: ArrayLike) -> Array:
         """Fraction present at time t [s], of the shape of t."""
@@ -124,10 +123,8 @@ def check_profile(profile: Any) -> None:
 
 
 def _check_finite(name: str, value: float) -> None:
-    if not is_finite_number(value):
-        raise ValueError(f"{name} is {value}; expected a finite time in seconds")
+    expect(is_finite_number(value), name, value, "a finite time in seconds")
 
 
 def _check_positive(name: str, value: float) -> None:
-    if not (is_finite_number(value) and value > 0):
-        raise ValueError(f"{name} is {value}; expected a positive time in seconds")
+    expect(is_finite_number(value) and value > 0, name, value, "a positive time in seconds")

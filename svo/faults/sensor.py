@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array, is_finite_number
+from svo.checks import Array, expect_one_of, is_finite_number
 from svo.faults.blocks import channels, check_channels, mapped, only_columns, only_rows, product_of, with_noise
 from svo.faults.profiles import Profile, at_times, check_profile
 from svo.models.model import Schedulable, UncertainModel, Uncertainty
@@ -69,8 +69,7 @@ class SensorFault:
 
     def __post_init__(self) -> None:
         channels(self.where)
-        if self.kind not in get_args(SensorKind):
-            raise ValueError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(SensorKind))}")
+        expect_one_of("kind", self.kind, get_args(SensorKind))
         check_profile(self.profile)
         if not is_finite_number(self.magnitude) or (self.magnitude == 0 and self.kind != "hard"):
             raise ValueError(f"magnitude of the {self.kind} is {self.magnitude}; expected a finite number, not zero")

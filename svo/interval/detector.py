@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
-from svo.checks import Array, real_array
+from svo.checks import Array, expect, real_array
 from svo.interval.bounds import GainBounds
 from svo.interval.noise import NoiseCharacterization
 from svo.interval.predictor import Interval, IntervalPrediction, IntervalPredictor
@@ -250,8 +250,7 @@ class IntervalDetector:
 def _number(name: str, value: Any) -> float:
     if not isinstance(value, float):
         value = _only(name, real_array(name, value, finite=False))
-    if not isfinite(value):
-        raise ValueError(f"{name} is {value}; expected a finite number")
+    expect(isfinite(value), name, value, "a finite number")
     return float(value)
 
 

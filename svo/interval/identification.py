@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from svo.checks import Array
+from svo.checks import Array, expect
 from svo.interval.bounds import GainBounds
 from svo.logs.log import Log
 
@@ -40,9 +40,7 @@ class FirstOrderFit:
     largest_error: float
 
 
-def identify_first_order(
-    records: Log | Sequence[Log], parts: int = 4, *, safety_factor: float = 1.2
-) -> FirstOrderFit:
+def identify_first_order(records: Log | Sequence[Log], parts: int = 4, *, safety_factor: float = 1.2) -> FirstOrderFit:
     """Least squares of the simulation error, with radii that contain what g and h did in the records.
 
     The predictor simulates, so the fit minimises ``|y - x|`` for x simulated from each record's first measurement by
@@ -77,10 +75,8 @@ def identify_first_order(
     every = [records] if isinstance(records, Log) else list(records)
     if not every:
         raise ValueError("records is empty; expected at least one fault-free log")
-    if parts < 1:
-        raise ValueError(f"parts is {parts}; expected a number of pieces >= 1")
-    if not (np.isfinite(safety_factor) and safety_factor >= 1):
-        raise ValueError(f"safety_factor is {safety_factor}; expected a number >= 1, such as 1.2")
+    expect(parts >= 1, "parts", parts, "a number of pieces >= 1")
+    expect(1 <= safety_factor < np.inf, "safety_factor", safety_factor, "a number >= 1, such as 1.2")
     whole = [_channels(log) for log in every]
     u_unit, y_unit = (_power_of_two(max(float(np.nanmax(np.abs(r[i]))) for r in whole)) for i in (0, 1))
     whole = [(u / u_unit, y / y_unit) for u, y in whole]

@@ -10,11 +10,9 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes.signatures import options_by_name
-from svo.checks import real_array
+from svo.checks import Array, expect, real_array
 from svo.interval.power_law import DEFAULT_EXPONENTS, PowerLaw, smallest_power_law
 from svo.interval.thresholds import checked_bounds, threshold_sequence
-
-Array = NDArray[np.float64]
 
 _BLOCK = 4096  # samples whose partial sums are made at once: they stay in the cache, and short sums round little
 
@@ -91,8 +89,7 @@ class NoiseCharacterization:
         ValueError
             For records that are too short or not finite, qbar < 1 or a safety factor <= 1.
         """
-        if not (np.isfinite(safety_factor) and safety_factor > 1):
-            raise ValueError(f"safety_factor is {safety_factor}; expected a number > 1, such as 1.2")
+        expect(1 < safety_factor < np.inf, "safety_factor", safety_factor, "a number > 1, such as 1.2")
         signals = _signals(records)
         longest = max(s.size for s in signals)
         if not 1 <= qbar <= longest:

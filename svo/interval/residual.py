@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array, finite_array, is_finite_number, readings
+from svo.checks import Array, expect, finite_array, is_finite_number, readings
 
 
 def dead_zone(y: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Array:
@@ -47,5 +47,4 @@ def first_order_filter(signal: ArrayLike, pole: float) -> Array:
 
 def check_pole(pole: float) -> None:
     """Raise a ValueError for a pole outside [0, 1)."""
-    if not (is_finite_number(pole) and 0 <= pole < 1):
-        raise ValueError(f"pole is {pole}; expected 0 <= pole < 1")
+    expect(is_finite_number(pole) and 0 <= pole < 1, "pole", pole, "0 <= pole < 1")

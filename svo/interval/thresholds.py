@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, real_array
+from svo.checks import Array, expect, real_array
 from svo.interval.residual import check_pole
 
 _EPS, _SMALLEST = float(np.finfo(float).eps), float(np.finfo(float).smallest_subnormal)
@@ -35,12 +35,10 @@ def filter_bound(
     """
     lam = checked_bounds(bounds)
     check_pole(pole)
-    if not 0 <= r <= lam.size:
-        raise ValueError(f"r is {r}; expected 0 <= r <= {lam.size}, the longest window of the characterisation")
+    expect(0 <= r <= lam.size, "r", r, f"0 <= r <= {lam.size}, the longest window of the characterisation")
     b = 1 - pole if gain is None else gain
     for name, value in (("mu", mu), ("gain", b), ("output_gain", output_gain)):
-        if not (np.isfinite(value) and value >= 0):
-            raise ValueError(f"{name} is {value}; expected a finite number >= 0")
+        expect(np.isfinite(value) and value >= 0, name, value, "a finite number >= 0")
     if r == 0:
         return float(output_gain * mu)
     q = np.arange(1, r)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import is_finite_number
+from svo.checks import expect, is_count, is_finite_number
 from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import BankState, Sample, restored, saved
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
@@ -135,8 +135,9 @@ class Bank(ABC):
         if self._sample is None:
             raise ValueError("late_update was called before the first measurement; call update(y0) first")
         taken = self._own_samples(sample, self._sample)
-        if not any(own is not None for own in taken.values()):
-            raise ValueError(f"sample is {sample!r}; expected one in the window of a running observer")
+        expect(
+            any(own is not None for own in taken.values()), "sample", sample, "one in the window of a running observer"
+        )
         last = {name: observer.window[1] for name, observer in self._running.items()}
 
         def late(name: str) -> Step:
@@ -163,8 +164,7 @@ class Bank(ABC):
 
     def _own_samples(self, sample: int, newest: int) -> dict[str, int | None]:
         """The number that each running observer gives to a sample of the bank; None if its window does not hold it."""
-        if isinstance(sample, bool) or not isinstance(sample, int | np.integer):
-            raise ValueError(f"sample is {sample!r}; expected the number of a sample")
+        expect(is_count(sample, 0), "sample", sample, "the number of a sample")
         found: dict[str, int | None] = {}
         for name, observer in self._running.items():
             if not observer.takes_late:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from svo.checks import is_count
+from svo.checks import expect, is_count
 from svo.isolation.logic import NOMINAL
 from svo.observers.base import Observer
 
@@ -35,8 +35,7 @@ def check_counts(debounce: int, recovery: int | None, timeout: int | None) -> No
         ("recovery", recovery, ", or None"),
         ("timeout", timeout, ", or None"),
     ):
-        if not (is_count(value, 1) or (or_none and value is None)):
-            raise ValueError(f"{name} is {value!r}; expected a number of samples >= 1{or_none}")
+        expect(is_count(value, 1) or (or_none and value is None), name, value, f"a number of samples >= 1{or_none}")
 
 
 def check_observers(observers: Mapping[str, Observer], same_states: bool) -> None:

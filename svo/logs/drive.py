@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Protocol, TypeVar
 
 from svo.checks import Array
-from svo.logs.log import Log
+from svo.logs.log import Log, expect_log
 
 Answer_co = TypeVar("Answer_co", covariant=True)
 Answer = TypeVar("Answer")
@@ -73,10 +73,7 @@ def drive(
     TypeError, ValueError
         If ``log`` is no log or has no samples, and what ``driven`` raises.
     """
-    if not isinstance(log, Log):
-        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.logs.file.read_log gives")
-    if len(log) == 0:
-        raise ValueError("log has no samples; expected at least one")
+    expect_log(log)
     for k in range(start, len(log)):
         held, y, u = log.u[k - 1] if k else None, log.y[k], log.u[k]
         schedule = log.schedule_at(k) if scheduler is None else scheduler(y, u)

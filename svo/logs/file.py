@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from svo.checks import is_finite_number
+from svo.checks import expect, is_finite_number
 from svo.logs.csv import read_csv, write_csv
 from svo.logs.log import Log
 from svo.logs.mat import read_mat_log, write_mat
@@ -69,8 +69,7 @@ def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
         If the format needs a package that is not installed.
     """
     path = Path(path)
-    if not (is_finite_number(Ts) and Ts > 0):
-        raise ValueError(f"Ts is {Ts!r}; expected a positive sampling time in seconds")
+    expect(is_finite_number(Ts) and Ts > 0, "Ts", Ts, "a positive sampling time in seconds")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; expected a log file, one of {', '.join(_FORMATS)}")
     return _format(path).read(path, columns, Ts)

@@ -166,3 +166,11 @@ class Log:
             Naming the sample and the variable.
         """
         return cls.from_columns("the data set", frames.cells_of_dataset(dataset, columns), columns, Ts)
+
+
+def expect_log(log: Any) -> None:
+    """Refuse what is no log, or has no samples."""
+    if not isinstance(log, Log):
+        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.logs.file.read_log gives")
+    if len(log) == 0:
+        raise ValueError("log has no samples; expected at least one")

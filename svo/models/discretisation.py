@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import Array, finite_array, positive_number
+from svo.checks import Array, expect, finite_array, positive_number
 from svo.models.held import Varying, which_vary
 from svo.models.inside_sample import departure, exponential, growth, kept
 from svo.models.stack import STATE_BLOCKS
@@ -104,6 +104,7 @@ def bounds_in(plant: Plant) -> tuple[Array, Array, Array]:
 def largest(name: str, value: ArrayLike | None, size: int) -> Array:
     """Largest absolute values (size,)."""
     array = finite_array(name, np.zeros(0) if value is None else value)
-    if array.shape != (size,) or (array < 0).any():
-        raise ValueError(f"{name} is {array}; expected the largest absolute values, shape ({size},)")
+    expect(
+        array.shape == (size,) and not (array < 0).any(), name, array, f"the largest absolute values, shape ({size},)"
+    )
     return array

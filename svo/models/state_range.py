@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from svo.checks import Array
+from svo.checks import Array, expect
 
 _EPS = float(np.finfo(np.float64).eps)
 
@@ -60,8 +60,7 @@ def state_range(name: str, value: Any, n: int, bounded: bool) -> StateRange | No
         return None
     wanted = f"(lower, upper), each a number or of shape ({n},), lower <= upper"
     wanted += ", all finite" if bounded else "; -inf or inf where there is no bound"
-    if not isinstance(value, tuple | list) or len(value) != 2:
-        raise ValueError(f"{name} is {value!r}; expected {wanted}")
+    expect(isinstance(value, tuple | list) and len(value) == 2, name, value, wanted)
     try:
         ends = [np.broadcast_to(np.array(end, dtype=float), (n,)).copy() for end in value]
     except (TypeError, ValueError) as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from polytopes import HPolytope
-from svo.checks import Array
+from svo.checks import Array, bounded_box
 from svo.models.model import UncertainModel
 
 
@@ -28,18 +28,7 @@ def first_box(P: HPolytope, model: UncertainModel) -> tuple[Array, Array]:
 
 def finite_box(P: HPolytope, n: int) -> tuple[Array, Array]:
     """Bounds of a set of first states, rounded outward where they had to be computed."""
-    if not isinstance(P, HPolytope):
-        raise TypeError(f"initial is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
-    if P.dim != n:
-        raise ValueError(f"initial has dimension {P.dim}; expected {n}, the number of states")
-    if P.emptiness().status != "nonempty":
-        raise ValueError("initial is empty, or not surely nonempty; expected a bounded set of first states")
-    lower, upper = (np.asarray(b, dtype=float) for b in P.bounding_box())
-    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        raise ValueError(
-            "initial is unbounded; expected a bounded set of first states, such as a box as large as they can be: "
-            "the measurements shrink it"
-        )
+    lower, upper = bounded_box("initial", P, n)
     given = len(P.C) == 0 and np.isin(P.A, (-1.0, 0.0, 1.0)).all() and (np.count_nonzero(P.A, axis=1) == 1).all()
     room = 0.0 if given else 1e-12 * np.maximum(np.abs(lower), np.abs(upper))
     return lower - room, upper + room

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import Array, is_count, is_finite_number, readings, real_array
+from svo.checks import Array, expect, is_count, is_finite_number, readings, real_array
 
 
 class Decision(NamedTuple):
@@ -142,28 +142,24 @@ def above(statistic: Array, threshold: float) -> NDArray[np.bool_]:
 def check_finite(**values: float) -> None:
     """Refuse numbers that are not finite."""
     for name, value in values.items():
-        if not is_finite_number(value):
-            raise ValueError(f"{name} is {value}; expected a finite number")
+        expect(is_finite_number(value), name, value, "a finite number")
 
 
 def check_positive(**values: float) -> None:
     """Refuse numbers that are not finite and positive."""
     for name, value in values.items():
-        if not (is_finite_number(value) and value > 0):
-            raise ValueError(f"{name} is {value}; expected a positive number")
+        expect(is_finite_number(value) and value > 0, name, value, "a positive number")
 
 
 def check_probability(**values: float) -> None:
     """Refuse numbers outside (0, 1)."""
     for name, value in values.items():
-        if not (is_finite_number(value) and 0 < value < 1):
-            raise ValueError(f"{name} is {value}; expected a probability between 0 and 1, both excluded")
+        expect(is_finite_number(value) and 0 < value < 1, name, value, "a probability between 0 and 1, both excluded")
 
 
 def check_count(name: str, value: int, least: int) -> None:
     """Refuse what is not a whole number of at least so much."""
-    if not is_count(value, least):
-        raise ValueError(f"{name} is {value!r}; expected a whole number >= {least}")
+    expect(is_count(value, least), name, value, f"a whole number >= {least}")
 
 
 def _checked(residual: ArrayLike) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from svo.checks import expect
 from svo.plant import HEALTHY, MonitoredPlant, Plant, architecture_of, in_architecture
 
 
@@ -67,16 +68,13 @@ class StudyConfiguration:
     architectures: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.runs < 1:
-            raise ValueError(f"runs is {self.runs}; expected at least 1 run of each fault and profile")
-        if self.seed < 0:
-            raise ValueError(f"seed is {self.seed}; expected an integer >= 0")
+        expect(self.runs >= 1, "runs", self.runs, "at least 1 run of each fault and profile")
+        expect(self.seed >= 0, "seed", self.seed, "an integer >= 0")
         for name in ("noise", "faults"):
             values = getattr(self, name)
-            if not values or len(set(values)) != len(values):
-                raise ValueError(f"{name} is {values}; expected one or more different names")
-        if len(set(self.architectures)) != len(self.architectures):
-            raise ValueError(f"architectures is {self.architectures}; expected different names")
+            expect(values and len(set(values)) == len(values), name, values, "one or more different names")
+        several = self.architectures
+        expect(len(set(several)) == len(several), "architectures", several, "different names")
 
     @classmethod
     def for_plant(

@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 
+from svo.checks import expect
 from svo.store import Parts
 from svo.store.parts import Row
 from svo.studies.attempt import Failed, Job, Outcome, attempt
@@ -41,10 +42,8 @@ class Place:
     limit: float | None = None
 
     def __post_init__(self) -> None:
-        if self.workers < 1:
-            raise ValueError(f"workers is {self.workers}; expected at least 1 process")
-        if self.limit is not None and not self.limit > 0:
-            raise ValueError(f"limit is {self.limit}; expected seconds > 0")
+        expect(self.workers >= 1, "workers", self.workers, "at least 1 process")
+        expect(self.limit is None or self.limit > 0, "limit", self.limit, "seconds > 0")
         if self.limit is not None and self.scheduler is not None:
             raise ValueError("a cluster cannot stop a run that takes too long; leave the limit or the scheduler out")
 

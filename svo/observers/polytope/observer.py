@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope, UndecidedError, warm_up
 from polytopes.signatures import options_by_name
-from svo.checks import Array, is_count
+from svo.checks import Array, expect, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm, set_in
 from svo.models.stack import may_be_nonzero
@@ -109,15 +109,12 @@ class PolytopeObserver(RecursiveObserver[Sample]):
         as_published: bool = False,
     ) -> None:
         super().__init__(model)
-        if not is_count(horizon, 1):
-            raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1")
+        expect(is_count(horizon, 1), "horizon", horizon, "an integer number of steps >= 1")
         slack = relative_slack(eps)
         coupled = _is_coupled(model)
         smallest = 2 * (model.n_states + (model.n_disturbances if coupled else 0))
-        if max_facets is not None and not is_count(max_facets, smallest):
-            raise ValueError(
-                f"max_facets is {max_facets!r}; expected an integer of at least {smallest}, or None for exact"
-            )
+        wanted = f"an integer of at least {smallest}, or None for exact"
+        expect(max_facets is None or is_count(max_facets, smallest), "max_facets", max_facets, wanted)
         if as_published:
             _check_published(model, coupled, int(horizon))
             warnings.warn(UNSOUND, UserWarning, stacklevel=2)

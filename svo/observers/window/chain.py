@@ -16,7 +16,7 @@ from flint import fmpq
 
 from svo.checks import Array
 from svo.logs.drive import drive
-from svo.logs.log import Log
+from svo.logs.log import Log, expect_log
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.memory import Memory
 from svo.observers.window.observer import WindowObserver
@@ -91,8 +91,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
     """
     if not isinstance(observer, WindowObserver):
         raise TypeError(f"observer is a {type(observer).__name__}; expected a WindowObserver, the only kind proven")
-    if not isinstance(log, Log):
-        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log")
+    expect_log(log)
     begun = perf_counter()
     waiting = list(late)
     for i, measurement in enumerate(waiting):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
-from svo.checks import Array, is_count
+from svo.checks import Array, expect, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
 from svo.observers import window_kernel as kernel
@@ -87,11 +87,10 @@ class WindowObserver(Observer):
         sign_split: int = 0,
     ) -> None:
         super().__init__(model)
-        if horizon is not None and not is_count(horizon, 1):
-            raise ValueError(f"horizon is {horizon!r}; expected an integer number of steps >= 1, or None for all data")
+        if horizon is not None:
+            expect(is_count(horizon, 1), "horizon", horizon, "an integer number of steps >= 1, or None for all data")
         slack = relative_slack(eps)
-        if not is_count(sign_split, 0):
-            raise ValueError(f"sign_split is {sign_split!r}; expected a number of cells >= 0 (0 = convex hulls)")
+        expect(is_count(sign_split, 0), "sign_split", sign_split, "a number of cells >= 0 (0 = convex hulls)")
         rows = template_rows(template, model.n_states)
         lower, upper = first_box(initial, model)
         form = NormalForm.at(model, lower, upper)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import Array, real_array
+from svo.checks import Array, expect, real_array
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
 from svo.models.stack import may_be_nonzero
@@ -23,8 +23,7 @@ def jitter(size: int) -> Array:
 def template_rows(template: str | ArrayLike, n: int) -> Array:
     """Directions (r, n) besides the axes in which arrival sets are bounded."""
     if isinstance(template, str):
-        if template != "box":
-            raise ValueError(f"template is {template!r}; expected 'box' or an array (rows, {n}) of directions")
+        expect(template == "box", "template", template, f"'box' or an array (rows, {n}) of directions")
         return np.zeros((0, n))
     return real_array("template", template, ("rows", n), meaning="directions")
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
-from svo.checks import Array, is_count
+from svo.checks import Array, expect, is_count
 from svo.models.model import UncertainModel
 from svo.models.normal_form import NormalForm
 from svo.observers.answers import VerdictName
@@ -228,6 +228,5 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
 def _limit(name: str, value: int | None, default: int, least: int) -> int:
     if value is None:
         return default
-    if not is_count(value, least):
-        raise ValueError(f"{name} is {value!r}; expected an integer of at least {least}, or None for {default}")
+    expect(is_count(value, least), name, value, f"an integer of at least {least}, or None for {default}")
     return int(value)

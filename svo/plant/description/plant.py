@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
+from svo.checks import expect
 from svo.interval.on_log import ThresholdDetection, detect_thresholds
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
@@ -89,8 +90,7 @@ class DescribedPlant:
         ValueError
             If ``noise`` is not "stated".
         """
-        if noise not in self.noise_sets:
-            raise ValueError(f"noise is {noise!r}; expected {STATED!r}, the bounds of {self.name}")
+        expect(noise in self.noise_sets, "noise", noise, f"{STATED!r}, the bounds of {self.name}")
         nominal = self._observer(self.model)
         faults = {name: self._observer(fault.model) for name, fault in self.faults.items()}
         if self.global_set is None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from svo.checks import expect
 from svo.detectors.detector import Detector, Kind, Setting
 from svo.logs.log import Log
 from svo.plant import HEALTHY, Distribution, Plant, fault_start, first_faulty_sample, load_plant
@@ -66,10 +67,8 @@ class Comparison:
     def __post_init__(self) -> None:
         training = ("healthy_training", "faulty_training", "healthy_calibration")
         for name in ("runs", *training, "healthy_runs", "evaluations"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; expected at least 1")
-        if not 0 <= self.rate < 1:
-            raise ValueError(f"rate is {self.rate}; expected a share of fault-free runs in [0, 1)")
+            expect(getattr(self, name) >= 1, name, getattr(self, name), "at least 1")
+        expect(0 <= self.rate < 1, "rate", self.rate, "a share of fault-free runs in [0, 1)")
 
     def to_dict(self) -> dict[str, Any]:
         """A form for JSON; lists instead of tuples."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import direct
 
+from svo.checks import expect
 from svo.detectors.detector import Detector, Setting
 from svo.indices import first_true, judge_alarm
 
@@ -76,10 +77,8 @@ def tune(
     ValueError
         If the rate or the number of evaluations is out of range, or there are no runs.
     """
-    if not 0 <= rate < 1:
-        raise ValueError(f"rate is {rate}; expected a share of runs in [0, 1)")
-    if evaluations < 1:
-        raise ValueError(f"evaluations is {evaluations}; expected at least one")
+    expect(0 <= rate < 1, "rate", rate, "a share of runs in [0, 1)")
+    expect(evaluations >= 1, "evaluations", evaluations, "at least one")
     if not healthy or not faulty or not calibration:
         counts = f"{len(healthy)} fault-free, {len(faulty)} faulty and {len(calibration)} calibration runs"
         raise ValueError(f"there are {counts}; expected some of each")
