@@ -6,7 +6,7 @@ Every finite float is a rational number, so a linear combination of rows of floa
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from flint import fmpq, fmpq_mat, fmpz
+from flint import arb, fmpq, fmpq_mat, fmpz
 from numpy.typing import NDArray
 
 Multipliers = dict[int, fmpq]  # row index -> multiplier; rows that are absent have multiplier zero
@@ -30,6 +30,13 @@ def rounded_up(value: fmpq) -> float:
     """The smallest float that is at least `value`."""
     number = int(value.p) / int(value.q)
     return number if rational(number) >= value else float(np.nextafter(number, np.inf))
+
+
+def ball_up(value: arb) -> float:
+    """The least float that is not below any number of a ball."""
+    top = value.upper()
+    nearest = float(top)
+    return nearest if not top > arb(nearest) else float(np.nextafter(nearest, np.inf))
 
 
 def rational_vector(values: NDArray[np.float64]) -> list[fmpq]:

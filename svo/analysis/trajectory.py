@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
+from polytopes.exact import ball_up
 from svo.checks import Array
 from svo.logs.log import Log
 from svo.models.normal_form import NormalForm
@@ -58,7 +58,7 @@ def needed_by(trajectory: Trajectory, form: NormalForm, log: Log, start: HPolyto
             within = within and _is_physical(x, form)
             y = form.outputs(log.y[k])
             for i in np.flatnonzero(~np.isnan(y)):
-                noise[k, i] = _up(abs(arb(float(y[i])) - output[int(i), 0]))
+                noise[k, i] = ball_up(abs(arb(float(y[i])) - output[int(i), 0]))
     return Needed(noise, within)
 
 
@@ -146,8 +146,3 @@ def _column(values: Array) -> arb_mat:
 def _matrix(array: Array) -> arb_mat:
     rows, columns = array.shape
     return arb_mat(rows, columns, [arb(float(v)) for v in array.ravel()])
-
-
-def _up(value: Any) -> float:
-    """A float that is not smaller."""
-    return float(np.nextafter(float(value.upper()), np.inf))

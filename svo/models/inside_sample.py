@@ -6,12 +6,11 @@ For dx/dt = A x + f(t) the state after a sample is exp(A Ts) x + int_0^Ts exp(A 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 from flint import arb, arb_mat, ctx
 
+from polytopes.exact import ball_up
 from svo.checks import Array
 
 _BITS = 512  # states in units of 2^-80 to 2^80 keep a float's digits
@@ -24,7 +23,7 @@ def exponential(M: Array, Ts: float) -> Array:
     """exp(M Ts), every entry the nearest float, so that units which are powers of two scale it to the bit."""
     bits = _BITS
     while True:
-        with _digits(bits):
+        with ctx.workprec(bits):
             entries = (_exact(M) * arb(Ts)).exp().tolist()
             if bits >= _MOST_BITS or all(_is_settled(v) for row in entries for v in row):
                 return np.array([[float(v.mid()) for v in row] for row in entries])
@@ -43,7 +42,7 @@ def growth(A: Array, Ts: float) -> Array:
     """
     n = len(A)
     zero, one = np.zeros((n, n)), np.eye(n)
-    with _digits():
+    with ctx.workprec(_BITS):
         # The last block of the first row of the exponential of this extension is the integral.
         joint = (_exact(np.block([[_metzler(A), one, zero], [zero, zero, one], [zero, zero, zero]])) * arb(Ts)).exp()
         return _rounded_up([[joint[i, 2 * n + j] for j in range(n)] for i in range(n)])
@@ -57,7 +56,7 @@ def departure(A: Array, M: Array, held: Array, Ts: float) -> Array:
     at most an eighth of the squared length times the largest second derivative there.
     """
     parts = _parts(A, Ts)
-    with _digits():
+    with ctx.workprec(_BITS):
         length = arb(Ts) / parts
         a, mean = _exact(A), _exact(held) / arb(Ts)
         move, grow = (a * length).exp(), (_exact(np.maximum(_metzler(A), 0.0)) * length).exp()
@@ -96,15 +95,6 @@ def _metzler(A: Array) -> Array:
     return np.where(np.eye(len(A), dtype=bool), A, np.abs(A))
 
 
-@contextmanager
-def _digits(bits: int = _BITS) -> Iterator[None]:
-    before, ctx.prec = ctx.prec, bits
-    try:
-        yield
-    finally:
-        ctx.prec = before
-
-
 def _exact(A: Array) -> arb_mat:
     return arb_mat([[arb(v) for v in row] for row in A.tolist()]) if A.size else arb_mat(*A.shape)
 
@@ -115,10 +105,4 @@ def _absolute(M: arb_mat) -> arb_mat:
 
 def _rounded_up(rows: list[list[arb]]) -> Array:
     """Floats that are not below any number of the balls."""
-    return np.array([[_up(v) for v in row] for row in rows], dtype=float)
-
-
-def _up(value: arb) -> float:
-    top = value.upper()
-    nearest = float(top)
-    return nearest if not top > arb(nearest) else math.nextafter(nearest, math.inf)
+    return np.array([[ball_up(v) for v in row] for row in rows], dtype=float)

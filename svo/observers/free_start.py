@@ -19,6 +19,7 @@ import numpy as np
 from flint import arb, ctx
 from numpy.typing import NDArray
 
+from polytopes.exact import ball_up
 from svo.checks import Array
 
 _BITS = 128
@@ -220,8 +221,5 @@ def _zeros(*shape: int) -> Any:
 
 def _up(balls: Any) -> Array:
     """Floats that are not smaller than anything in the balls."""
-    flat = []
-    for ball in np.asarray(balls, dtype=object).ravel():
-        value = float(ball.upper())
-        flat.append(value if arb(value) >= ball else float(np.nextafter(value, np.inf)))
-    return np.array(flat).reshape(np.shape(balls))
+    array = np.asarray(balls, dtype=object)
+    return np.array([ball_up(ball) for ball in array.ravel()]).reshape(array.shape)

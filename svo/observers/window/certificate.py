@@ -7,6 +7,7 @@ model's own matrix is a disturbance with a bound, entry by entry (`svo.observers
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from flint import fmpq
 
 from svo.checks import Array
+from svo.logs.log import Log
 from svo.models.digest import ModelSample
 from svo.models.normal_form import Exponents, power
 from svo.observers.certificate import Certificate, started_again
@@ -87,6 +89,28 @@ class WindowCertificate(WindowEvidence, Certificate):
             return -DualSum(self, (sample - self.first, direction)).gap()
         except NoProof:
             return None
+
+
+class OnWindow(Certificate):
+    """A proof that rests on that of a window: it is about the same samples, under the same premise."""
+
+    @abstractmethod
+    def _window(self) -> WindowCertificate:
+        """The proof that this one rests on."""
+
+    @property
+    def samples(self) -> tuple[WindowSample, ...]:
+        """Model and data of the window."""
+        return self._window().samples
+
+    def premise(self, sample: int) -> str:
+        return self._window().premise(sample)
+
+    def model_data(self) -> tuple[ModelSample, ...]:
+        return self._window().model_data()
+
+    def difference(self, last: int, log: Log) -> str | None:
+        return self._window().difference(last, log)
 
 
 def _with_known_start(c: WindowCertificate) -> Iterator[WindowCertificate]:

@@ -14,13 +14,13 @@ from time import perf_counter
 
 from flint import fmpq
 
+from polytopes.exact import rational
 from svo.checks import Array
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.memory import Memory
 from svo.observers.window.observer import WindowObserver
-from svo.observers.window.weak_duality import exact
 from svo.observers.window.window import Window
 
 
@@ -171,7 +171,7 @@ class BoundProver:
         """The bound of the next arrival set that a program has just given."""
         arrays, i, lower = window.memory.arrays, program // 2, program % 2 == 1
         target = window.memory.base + window.memory.size.block
-        bound = exact(-arrays["new_lower"][i] if lower else arrays["new_upper"][i])
+        bound = rational(-arrays["new_lower"][i] if lower else arrays["new_upper"][i])
         proven = _proven(window, program, target, -arrays["T"][i] if lower else arrays["T"][i])
         what = f"arrival bound {program} of sample {target + window.origin}"
         self._count(proven is not None and proven <= bound, what)
@@ -181,7 +181,10 @@ class BoundProver:
         memory, arrays, size = window.memory, window.memory.arrays, window.memory.size
         v, time = memory.variables, memory.time
         f = (1.0 - 2.0 * side) * arrays["functional"][v, q]
-        bound, known = exact(arrays["s_upper"][v, q] if side == 0 else -arrays["s_lower"][v, q]), _known_part(memory, f)
+        bound, known = (
+            rational(arrays["s_upper"][v, q] if side == 0 else -arrays["s_lower"][v, q]),
+            _known_part(memory, f),
+        )
         bases = [4 * size.nt + 2 * q + side, None] if is_open else [None]
         proofs = [_proven(window, basis, time, f[: size.n]) for basis in bases]
         holds = any(proof is not None and proof + known <= bound for proof in proofs)
@@ -197,11 +200,11 @@ class BoundProver:
 def _known_part(memory: Memory, f: Array) -> fmpq:
     """Largest value of what u, the constant and w of the newest sample contribute to f'(x, u, 1, w)."""
     arrays, n, nu, v = memory.arrays, memory.size.n, memory.size.nu, memory.variables
-    total = exact(f[n + nu])
+    total = rational(f[n + nu])
     for value, u in zip(f[n : n + nu], arrays["u"][memory.slot], strict=True):
-        total += exact(value) * exact(u)
+        total += rational(value) * rational(u)
     for value, low, high in zip(f[n + nu + 1 :], arrays["w_lower"][v], arrays["w_upper"][v], strict=True):
-        total += exact(value) * exact(high if value > 0 else low)
+        total += rational(value) * rational(high if value > 0 else low)
     return total
 
 

@@ -15,12 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from svo.checks import Array
-from svo.logs.log import Log
-from svo.models.digest import ModelSample
 from svo.observers import window_kernel as kernel
-from svo.observers.certificate import Certificate
-from svo.observers.window.certificate import WindowCertificate
-from svo.observers.window.evidence import ArrivalSet, WindowSample
+from svo.observers.window.certificate import OnWindow, WindowCertificate
+from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.memory import Memory
 
 Cell = dict[tuple[int, int], tuple[float, float]]  # (sample, channel): bounds of its s
@@ -30,8 +27,10 @@ _INEXACT = 1e-9  # of the half-width of p, by which p may miss Delta s
 
 
 @dataclass(frozen=True, eq=False)
-class SplitCertificate(Certificate):
+class SplitCertificate(OnWindow):
     """Proof that a window is empty whatever the signs of its s: one certificate a cell, and the cells cover all.
+
+    Its ``samples`` have the bounds of s and the multipliers of the first cell.
 
     Attributes
     ----------
@@ -59,11 +58,6 @@ class SplitCertificate(Certificate):
     def n(self) -> int:
         return self.cells[0].n
 
-    @property
-    def samples(self) -> tuple[WindowSample, ...]:
-        """Model and data of the window; bounds of s and multipliers are those of the first cell."""
-        return self.cells[0].samples
-
     def verify(self) -> bool:
         """Check every cell in exact arithmetic, that all have the same data, and that none is missing."""
         if not self.cells or not all(cell.verify() for cell in self.cells):
@@ -81,15 +75,8 @@ class SplitCertificate(Certificate):
         """As `WindowCertificate.resting_on`, in every cell."""
         return replace(self, cells=tuple(cell.resting_on(largest_at) for cell in self.cells))
 
-    def premise(self, sample: int) -> str:
-        return self.cells[0].premise(sample)
-
-    def model_data(self) -> tuple[ModelSample, ...]:
-        return self.cells[0].model_data()
-
-    def difference(self, last: int, log: Log) -> str | None:
-        """As of every certificate; `verify` holds the cells against each other."""
-        return self.cells[0].difference(last, log)
+    def _window(self) -> WindowCertificate:
+        return self.cells[0]
 
 
 def _same_window(a: WindowCertificate, b: WindowCertificate) -> bool:

@@ -15,16 +15,10 @@ from __future__ import annotations
 import numpy as np
 from flint import fmpq
 
+from polytopes.exact import ZERO, rational
 from svo.checks import Array
 from svo.observers.window.evidence import WindowEvidence, WindowSample
 from svo.observers.window.left_out import Factors, factors_of, left_out
-
-ZERO = fmpq(0)
-
-
-def exact(value: float) -> fmpq:
-    """The rational number that a finite float is."""
-    return fmpq(*float(value).as_integer_ratio())
 
 
 def _interval_min(coefficient: fmpq, lower: fmpq, upper: fmpq) -> fmpq:
@@ -59,12 +53,12 @@ class DualSum:
             newest = index == len(c.samples) - 1
             costate = self._sample(c.samples[index], costate, newest, factors[index], rest[index] if rest else [])
             if self.objective is not None and self.objective[0] == index:
-                costate = [p - exact(d) for p, d in zip(costate, self.objective[1], strict=True)]
+                costate = [p - rational(d) for p, d in zip(costate, self.objective[1], strict=True)]
         for r, multiplier in enumerate(c.on_arrival):
             if multiplier:
-                m = exact(multiplier)
+                m = rational(multiplier)
                 self._bound(m, c.arrival.lower[r], c.arrival.upper[r])
-                costate = [p + m * exact(a) for p, a in zip(costate, c.arrival.rows[r], strict=True)]
+                costate = [p + m * rational(a) for p, a in zip(costate, c.arrival.rows[r], strict=True)]
         for p, low, high in zip(costate, c.arrival.box_lower, c.arrival.box_upper, strict=True):
             if p:
                 self._box(p, low, high)
@@ -88,10 +82,10 @@ class DualSum:
         bound = upper if multiplier > 0 else lower
         if not np.isfinite(bound):
             raise NoProof
-        self.total -= multiplier * exact(bound)
+        self.total -= multiplier * rational(bound)
 
     def _box(self, coefficient: fmpq, lower: float, upper: float) -> None:
-        self.total += _interval_min(coefficient, exact(lower), exact(upper))
+        self.total += _interval_min(coefficient, rational(lower), rational(upper))
 
     def _sample(self, s: WindowSample, after: list[fmpq], newest: bool, of: Factors, rest: list[fmpq]) -> list[fmpq]:
         """Account for one sample; ``after`` is the costate of the next state, the result that of this one."""
@@ -101,7 +95,7 @@ class DualSum:
         weight = list(after) + [ZERO] * ny
         for o, multiplier in enumerate(s.on_output):
             if multiplier:
-                weight[n + o] = self._output(s, o, exact(multiplier))
+                weight[n + o] = self._output(s, o, rational(multiplier))
         known: list[fmpq] = [ZERO] * s.stack.shape[2]
         self._combine(known, s.stack[0], weight)
         if active:
@@ -112,15 +106,15 @@ class DualSum:
             raise NoProof
         for value, coefficient in zip(s.u, known[n : n + nu], strict=True):
             if coefficient:
-                self.total += coefficient * exact(value)
+                self.total += coefficient * rational(value)
         self.total += known[n + nu]
         return known[:n]
 
     def _output(self, s: WindowSample, o: int, m: fmpq) -> fmpq:
         if not np.isfinite(s.y[o]):
             raise NoProof
-        reach = exact(s.noise[o]) + exact(s.slack[o])
-        self.total -= m * (exact(s.y[o]) + (reach if m > 0 else -reach))
+        reach = rational(s.noise[o]) + rational(s.slack[o])
+        self.total -= m * (rational(s.y[o]) + (reach if m > 0 else -reach))
         return m
 
     @staticmethod
@@ -129,7 +123,7 @@ class DualSum:
         for i, w in enumerate(weight):
             if w:
                 for j in np.flatnonzero(matrix[i]):
-                    target[j] += w * exact(matrix[i, j])
+                    target[j] += w * rational(matrix[i, j])
 
     def _channels(self, s: WindowSample, weight: list[fmpq], known: list[fmpq], of: Factors, newest: bool) -> None:
         """Add each channel's p: its box, its two lines over s = functional'(x, u, 1, w), and its effect.
@@ -140,17 +134,17 @@ class DualSum:
         for q, (gain, functional) in enumerate(zip(of.gains, of.functionals, strict=True)):
             if newest and not (np.any(gain[self.c.n :]) or s.s_lower[q] or s.s_upper[q]):
                 continue
-            lo, hi = (exact(v) for v in self.c.delta[q])
-            low, high = exact(s.s_lower[q]), exact(s.s_upper[q])
-            on_p = sum((w * exact(g) for w, g in zip(weight, gain, strict=True) if w and g), ZERO)
+            lo, hi = (rational(v) for v in self.c.delta[q])
+            low, high = rational(s.s_lower[q]), rational(s.s_upper[q])
+            on_p = sum((w * rational(g) for w, g in zip(weight, gain, strict=True) if w and g), ZERO)
             on_s = ZERO
             for side in range(2):
                 multiplier = s.on_channel[q, side]
                 if multiplier:
                     m, slope, intercept = (
-                        exact(multiplier),
-                        exact(s.lines[q, 2 * side]),
-                        exact(s.lines[q, 2 * side + 1]),
+                        rational(multiplier),
+                        rational(s.lines[q, 2 * side]),
+                        rational(s.lines[q, 2 * side + 1]),
                     )
                     self._check_line(1 - 2 * side, slope, intercept, (lo, hi), (low, high))
                     if m < 0:
@@ -161,7 +155,7 @@ class DualSum:
                     self.total -= sign * m * intercept
             if on_s:
                 for j in np.flatnonzero(functional):
-                    known[j] += on_s * exact(functional[j])
+                    known[j] += on_s * rational(functional[j])
             if on_p:
                 products = [d * v for d in (lo, hi) for v in (low, high)]
                 self.total += _interval_min(on_p, min(products), max(products))
@@ -180,10 +174,10 @@ class DualSum:
         n, nu = self.c.n, s.u.size
         if np.any(functional[:n]) or np.any(functional[n + nu + 1 :]):
             return
-        value = exact(functional[n + nu])
+        value = rational(functional[n + nu])
         for j in range(nu):
             if functional[n + j]:
-                value += exact(functional[n + j]) * exact(s.u[j])
+                value += rational(functional[n + j]) * rational(s.u[j])
         if not low <= value <= high:
             raise NoProof
 
@@ -191,9 +185,9 @@ class DualSum:
         c = list(coefficients)
         for h, multiplier in enumerate(s.on_w):
             if multiplier:
-                m = exact(multiplier)
+                m = rational(multiplier)
                 self._bound(m, self.c.w_rows_lower[h], self.c.w_rows_upper[h])
-                c = [v + m * exact(a) for v, a in zip(c, self.c.w_rows[h], strict=True)]
+                c = [v + m * rational(a) for v, a in zip(c, self.c.w_rows[h], strict=True)]
         for value, low, high in zip(c, s.w_lower, s.w_upper, strict=True):
             if value:
                 self._box(value, low, high)

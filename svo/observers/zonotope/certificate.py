@@ -15,16 +15,12 @@ from flint import fmpq
 
 from polytopes.exact import ZERO, rational
 from svo.checks import Array
-from svo.logs.log import Log
-from svo.models.digest import ModelSample
-from svo.observers.certificate import Certificate
-from svo.observers.window.certificate import WindowCertificate
-from svo.observers.window.evidence import WindowSample
+from svo.observers.window.certificate import OnWindow, WindowCertificate
 from svo.observers.zonotope.zonotope import ConstrainedZonotope
 
 
 @dataclass(frozen=True, eq=False)
-class ZonotopeCertificate(Certificate):
+class ZonotopeCertificate(OnWindow):
     """Proof that no state of a constrained zonotope explains the measurements of the last two samples.
 
     Conditional, as that of a window: on the arrival set, which was computed in floats and rounded outward, and on the
@@ -51,11 +47,6 @@ class ZonotopeCertificate(Certificate):
         """Sample of the falsification."""
         return self.window.last
 
-    @property
-    def samples(self) -> tuple[WindowSample, ...]:
-        """Those of the window."""
-        return self.window.samples
-
     def verify(self) -> bool:
         """Whether the proof holds in exact rational arithmetic.
 
@@ -75,14 +66,8 @@ class ZonotopeCertificate(Certificate):
         rows = [(known.rows[0], known.upper[0], self.multipliers), *hull]
         return all(proven_support(Z, d, mu) <= rational(h) for d, h, mu in rows)
 
-    def premise(self, sample: int) -> str:
-        return self.window.premise(sample)
-
-    def model_data(self) -> tuple[ModelSample, ...]:
-        return self.window.model_data()
-
-    def difference(self, last: int, log: Log) -> str | None:
-        return self.window.difference(last, log)
+    def _window(self) -> WindowCertificate:
+        return self.window
 
     def _is_well_formed(self) -> bool:
         Z, n = self.arrival, self.window.n
@@ -113,9 +98,3 @@ def proven_support(Z: ConstrainedZonotope, direction: Array, multipliers: Array)
 def _add(target: list[fmpq], factor: fmpq, row: Array) -> None:
     for j in np.flatnonzero(row):
         target[j] += factor * rational(row[j])
-
-
-def rounded_up(value: fmpq) -> float:
-    """The nearest float that is not smaller."""
-    guess = float(int(value.p) / int(value.q))
-    return guess if rational(guess) >= value else float(np.nextafter(guess, np.inf))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.exact import rounded_up
 from svo.checks import Array
 from svo.models.normal_form import NormalForm
 from svo.observers.given_units import zonotope_proof_out
@@ -21,7 +22,7 @@ from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import ArrivalSet, WindowSample
 from svo.observers.window.setup import channel_owners, disturbance_rows, output_is_disturbed
 from svo.observers.window_kernel import channel_factors
-from svo.observers.zonotope.certificate import ZonotopeCertificate, proven_support, rounded_up
+from svo.observers.zonotope.certificate import ZonotopeCertificate, proven_support
 from svo.observers.zonotope.program import ZonotopeProgram
 from svo.observers.zonotope.zonotope import EPS, ConstrainedZonotope, unit
 
