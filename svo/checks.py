@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from importlib import import_module
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ __all__ = [
     "bounded_box",
     "check_disturbance_box",
     "check_noise",
+    "chosen",
     "expect",
     "expect_one_of",
     "finite_array",
@@ -34,6 +35,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+Item = TypeVar("Item")
 
 
 def expect(holds: object, name: str, value: Any, what: str) -> None:
@@ -46,6 +48,12 @@ def expect(holds: object, name: str, value: Any, what: str) -> None:
 def expect_one_of(name: str, value: Any, choices: Collection[str]) -> None:
     """Refuse what is none of some words."""
     expect(value in choices, name, value, f"one of {', '.join(choices)}")
+
+
+def chosen(name: str, value: str, choices: Mapping[str, Item]) -> Item:
+    """What a word stands for."""
+    expect_one_of(name, value, choices)
+    return choices[value]
 
 
 def sizes(name: str, value: Any, count: int) -> Array:

@@ -14,7 +14,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from aircraft.eclipse.models import BOUNDS_FILE, NAMES, MismatchBounds
+from aircraft import bounds_file
+from aircraft.eclipse.models import NAMES, MismatchBounds
 from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.scenarios import FAULTS, HEALTHY, PROFILES, Run, Scenarios
 from svo.checks import Array
@@ -26,7 +27,7 @@ SPAWN_KEY = 0x0EC11953  # a study spawns its runs' seeds as 0, 1, 2, ...; this b
 MARGIN = 1.5
 HEALTHY_MARGIN = 2.5
 RUNS = 500
-BOUNDS_PATH = Path(__file__).with_name(BOUNDS_FILE)
+BOUNDS_PATH = Path(__file__).with_name(bounds_file.NAME)
 
 
 @dataclass(frozen=True)
@@ -104,11 +105,7 @@ def to_toml(bounds: Mapping[str, Mapping[str, MismatchBounds]], runs: int) -> st
         f"# state: per sample, {', '.join(NAMES['states'])} [m/s, m/s, rad, rad/s];"
         f" output: {', '.join(NAMES['outputs'])} [m/s, rad, rad, rad/s]",
     ]
-    for noise, observers in bounds.items():
-        for observer, b in observers.items():
-            lines += ["", f"[{noise}.{observer}]"]
-            lines += [f"{name} = [{', '.join(f'{v:.3e}' for v in getattr(b, name))}]" for name in ("state", "output")]
-    return "\n".join(lines) + "\n"
+    return bounds_file.to_text("\n".join(lines), bounds)
 
 
 def main(

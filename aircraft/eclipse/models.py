@@ -10,14 +10,13 @@ The mismatch bounds are measured (`aircraft.eclipse.mismatch`), for each noise s
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.resources import files
 
 import numpy as np
 
+from aircraft import bounds_file
 from aircraft.eclipse.derivatives import VALID_AIRSPEED, Derivatives
 from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.schedule import ScheduledBlocks
@@ -34,7 +33,6 @@ NAMES = {
     "outputs": ("V", "alpha", "theta", "q"),
     "disturbances": ("gust u", "gust w", "gust q", "mismatch u", "mismatch w", "mismatch theta", "mismatch q"),
 }
-BOUNDS_FILE = "bounds.toml"
 SPEED_MOMENT_INCREASE = 0.3  # of M_u at the full dynamics fault
 
 
@@ -60,11 +58,7 @@ class MismatchBounds:
 
 def read_bounds() -> Mapping[str, Mapping[str, MismatchBounds]]:
     """The measured bounds that ship with the package: noise set -> observer ("nominal" or a fault) -> bounds."""
-    text = files("aircraft.eclipse").joinpath(BOUNDS_FILE).read_text(encoding="utf-8")
-    return {
-        noise: {observer: MismatchBounds(**values) for observer, values in observers.items()}
-        for noise, observers in tomllib.loads(text).items()
-    }
+    return bounds_file.read("aircraft.eclipse", MismatchBounds)
 
 
 @dataclass(frozen=True)

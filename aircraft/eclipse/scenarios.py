@@ -17,7 +17,7 @@ from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.simulator import Controller, Corruption, Flight, Surrogate, fly
 from aircraft.eclipse.trim import level_trim
-from svo.checks import Array, expect, expect_one_of
+from svo.checks import Array, chosen, expect
 from svo.faults import ActuatorFault, PlantFault, Profile, Ramp, SensorFault, Step
 from svo.plant import Distribution
 
@@ -90,8 +90,7 @@ class Scenarios:
         ValueError
             If the fault or the profile is not one of the scenarios.
         """
-        expect_one_of("profile", profile, PROFILES)
-        shape = PROFILES[profile][0]
+        shape, _ = chosen("profile", profile, PROFILES)
         if name == "alpha":
             return SensorFault(ALPHA, "bias", self.size * ALPHA_BIAS[profile], shape)
         if name == "elevator":
@@ -124,7 +123,7 @@ class Scenarios:
         time = np.arange(samples, dtype=np.float64) * float(self.model.Ts)
         active = None if fault == HEALTHY else self.fault(fault, profile)
         rng = np.random.default_rng(seed)
-        sensor_noise, gusts = NOISE_SETS[_known(noise)].draw(samples, self.model.Ts, rng, self.distribution)
+        sensor_noise, gusts = chosen("noise", noise, NOISE_SETS).draw(samples, self.model.Ts, rng, self.distribution)
         corruption = corrupt(active, time, self.model.moment_reference)
         start = level_trim(self.model.surrogate, DESIGN_AIRSPEED).x
         controller = _autopilot(noise, self.model.Ts, self.model.surrogate)
@@ -163,8 +162,3 @@ def corrupt(fault: Fault | None, time: Array, moment_reference: float) -> Corrup
 @cache
 def _autopilot(noise: str, Ts: float, surrogate: Surrogate) -> Controller:
     return design_autopilot(NOISE_SETS[noise], Ts, surrogate, Derivatives())
-
-
-def _known(noise: str) -> str:
-    expect_one_of("noise", noise, NOISE_SETS)
-    return noise

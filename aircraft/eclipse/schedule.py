@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array, expect_one_of
+from svo.checks import Array, chosen
 from svo.models.schedule_table import ScheduleTable
 
 FILTER_TIME_S = 0.5
@@ -95,5 +95,4 @@ class ScheduledBlocks:
 
     def block(self, name: str) -> ScheduleTable:
         """One block as a function of the schedule."""
-        expect_one_of("name", name, self.tables)
-        return ScheduleTable(self._flat.points, self.tables[name])
+        return ScheduleTable(self._flat.points, chosen("name", name, self.tables))

@@ -12,7 +12,7 @@ from aircraft.elevator.gains import ServoGains
 from aircraft.elevator.scenarios import COMMANDS, DURATION, SCENARIOS, TRAVEL, TS, Scenario, SensorNoise
 from aircraft.elevator.servo import Servo
 from polytopes import HPolytope
-from svo.checks import Array, expect_one_of
+from svo.checks import Array, chosen
 from svo.detectors.detector import Detector
 from svo.faults import ActuatorFault
 from svo.interval import (
@@ -184,8 +184,7 @@ class Elevator:
         return SCENARIOS[fault, profile]
 
     def _bound(self, noise: str) -> float:
-        expect_one_of("noise", noise, NOISE_BOUNDS)
-        return NOISE_BOUNDS[noise] * self.sensor.sigma
+        return chosen("noise", noise, NOISE_BOUNDS) * self.sensor.sigma
 
     def _run(self, command: str, noise: str, seed: int | np.random.SeedSequence, scenario: Scenario | None) -> Log:
         time = np.arange(round(DURATION / self.Ts), dtype=np.float64) * self.Ts

@@ -13,15 +13,16 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from aircraft import bounds_file
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
-from aircraft.missile.models import BOUNDS_FILE, Embedding, MismatchBounds, schedule_of
+from aircraft.missile.models import Embedding, MismatchBounds, schedule_of
 from aircraft.missile.plant import ENDS, FAULTS, STARTS, fault_of
 from aircraft.missile.scenarios import TS, Fault, Flights, Run
 
 SPAWN_KEY = 0x0EC11953  # a study spawns its runs' seeds as 0, 1, 2, ...; this branch is never reached that way
 MARGIN = 1.5
 RUNS = 200
-BOUNDS_PATH = Path(__file__).with_name(BOUNDS_FILE)
+BOUNDS_PATH = Path(__file__).with_name(bounds_file.NAME)
 
 
 def mismatch(run: Run, embedding: Embedding, errors: SensorErrors) -> MismatchBounds:
@@ -71,11 +72,7 @@ def to_toml(bounds: Mapping[str, Mapping[str, MismatchBounds]], runs: int) -> st
         f"# fault-free bound), from {STARTS:g} to {ENDS:g} s.  python -m aircraft.missile.mismatch --runs {runs}",
         "# force, output: m/s^2 in x, y, z; velocity: m/s per sample",
     ]
-    for noise, observers in bounds.items():
-        for observer, b in observers.items():
-            lines += ["", f"[{noise}.{observer}]"]
-            lines += [f"{name} = [{', '.join(f'{v:.3e}' for v in value)}]" for name, value in vars(b).items()]
-    return "\n".join(lines) + "\n"
+    return bounds_file.to_text("\n".join(lines), bounds)
 
 
 def main(

@@ -16,22 +16,20 @@ of B and D are zero.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from aircraft import bounds_file
 from aircraft.missile.airframe import INPUTS, Airframe
 from aircraft.missile.imu import SensorErrors
 from aircraft.missile.redundancy import ForceBalance
 from svo.checks import Array, expect, sizes
 from svo.models.model import UncertainModel
 
-BOUNDS_FILE = "bounds.toml"
 OUTPUTS = (9, 10, 11, 0, 1, 2)  # of the 15 measurements: velocity, acceleration
 SCHEDULING = (3, 4, 5, 8, 12, 13)  # rates, z, phi, theta; the schedule of a sample is all twelve, in this order
 N_INPUTS = len(INPUTS) + len(SCHEDULING)
@@ -69,11 +67,7 @@ class MismatchBounds:
 
 def read_bounds() -> Mapping[str, Mapping[str, MismatchBounds]]:
     """The measured bounds that ship with the package: noise set -> observer ("nominal" or a fault) -> bounds."""
-    text = files("aircraft.missile").joinpath(BOUNDS_FILE).read_text(encoding="utf-8")
-    return {
-        noise: {observer: MismatchBounds(**values) for observer, values in observers.items()}
-        for noise, observers in tomllib.loads(text).items()
-    }
+    return bounds_file.read("aircraft.missile", MismatchBounds)
 
 
 def schedule_of(y: Array) -> Array:

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aircraft.missile.airframe import INPUT_LOWER, INPUT_UPPER, INPUTS, Airframe
 from aircraft.missile.simulator import ACCELERATION, VELOCITY, dynamic_pressure, force_coefficients
-from svo.checks import Array, expect_one_of
+from svo.checks import Array, chosen, real_array
 
 DL, DM, DN, ETA = range(4)
 TRAVEL = np.maximum(np.abs(INPUT_LOWER), np.abs(INPUT_UPPER))
@@ -107,9 +107,7 @@ class ForceBalance:
     @classmethod
     def of(cls, y: ArrayLike, airframe: Airframe) -> ForceBalance:
         """From measurements (K, 15)."""
-        measured = np.asarray(y, dtype=float)
-        if measured.ndim != 2 or measured.shape[1] != 15:
-            raise ValueError(f"y has shape {measured.shape}; expected (K, 15), one row a sample")
+        measured = real_array("y", y, ("K", 15), meaning="one row a sample", finite=False, missing=True)
         vx, vy, vz = measured[:, VELOCITY].T
         p = airframe.packed()
         alpha, beta = np.arctan2(vz, vx), np.arctan2(vy, vx)
@@ -197,8 +195,7 @@ def moving_mean(values: Array, samples: int) -> Array:
 
 def known_residual(name: str) -> Residual:
     """The residual of that name; ValueError if there is none."""
-    expect_one_of("residual", name, RESIDUALS)
-    return RESIDUALS[name]
+    return chosen("residual", name, RESIDUALS)
 
 
 def signature_matrix(airframe: Airframe, names: Sequence[str] = TABLE_1) -> NDArray[np.bool_]:

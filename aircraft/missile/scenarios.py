@@ -11,7 +11,7 @@ import numpy as np
 from aircraft.missile.airframe import DEFLECTION_LIMIT, INPUT_LOWER, INPUT_UPPER, INPUTS, Airframe
 from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
 from aircraft.missile.simulator import Corruption, Flight, Guidance, fly
-from svo.checks import Array, expect_one_of
+from svo.checks import Array, chosen
 from svo.faults import ActuatorFault, SensorFault, Step
 
 Fault = ActuatorFault | SensorFault
@@ -161,8 +161,7 @@ def noise_set(name: str) -> SensorErrors:
     ValueError
         If there are none of that name.
     """
-    expect_one_of("noise", name, NOISE_SETS)
-    return NOISE_SETS[name]
+    return chosen("noise", name, NOISE_SETS)
 
 
 def _channel(fault: Fault) -> int:

@@ -233,10 +233,7 @@ def _balanced(A: Array, C: Array, E: Array, D: Array) -> tuple[Array, Array, Arr
 def _columns(name: str, value: ArrayLike | None, rows: int) -> Array:
     if value is None:
         return np.zeros((rows, 0))
-    array = finite_array(name, value)
-    if array.ndim != 2 or len(array) != rows:
-        raise ValueError(f"{name} has shape {array.shape}; expected ({rows}, number of unknown inputs)")
-    return array
+    return finite_array(name, value, (rows, "number of unknown inputs"))
 
 
 def _number(value: np.complex128) -> str:

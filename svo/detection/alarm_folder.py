@@ -58,16 +58,7 @@ class WatchFolder:
         record = alarm_line(alarm)
         if record.rstrip("\n") in self._known:
             return
-        with self.alarms.open("ab") as file:
-            size = os.fstat(file.fileno()).st_size
-            try:
-                file.write(record.encode())
-                file.flush()
-                os.fsync(file.fileno())
-            except OSError:
-                with suppress(OSError):  # a full disk may have taken half of it
-                    os.truncate(self.alarms, size)
-                raise
+        _append(self.alarms, record.encode())
         self._known.add(record.rstrip("\n"))
 
     def _set_cut_end_aside(self) -> None:
@@ -76,12 +67,23 @@ class WatchFolder:
         end = content.rfind(b"\n") + 1
         if end < len(content):
             cut = self.alarms.with_name(_CUT)
-            with cut.open("ab") as file:
-                file.write(content[end:] + b"\n")
-                file.flush()
-                os.fsync(file.fileno())
+            _append(cut, content[end:] + b"\n")
             os.truncate(self.alarms, end)
             self.notes.append(f"the last record of {self.alarms} was cut when it was written; it is now in {cut}")
+
+
+def _append(path: Path, content: bytes) -> None:
+    """All of it, on the disk, or nothing."""
+    with path.open("ab") as file:
+        size = os.fstat(file.fileno()).st_size
+        try:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        except OSError:
+            with suppress(OSError):  # a full disk may have taken half of it
+                os.truncate(path, size)
+            raise
 
 
 @contextmanager

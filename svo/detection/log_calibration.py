@@ -14,7 +14,8 @@ from polytopes import HPolytope
 from svo.analysis.calibration import Calibration, calibrate
 from svo.detection.detect import check_log
 from svo.logs.log import Log
-from svo.plant import MonitoredPlant, schedule_of
+from svo.plant import MonitoredPlant
+from svo.plant.scheduling import scheduled
 
 
 @dataclass(frozen=True)
@@ -78,11 +79,8 @@ def calibrate_log(plant: MonitoredPlant, log: Log, noise: str) -> LogCalibration
     Raises as `svo.detection.detect.detect` and `svo.analysis.calibration.calibrate` do.
     """
     check_log(plant, log)
-    nominal, scheduler = plant.bank(noise).observers["nominal"], plant.scheduler()
-    values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
-    schedule = None if values[0] is None else np.array(values, dtype=float)
-    scheduled = Log(time=log.time, u=log.u, y=log.y, schedule=schedule)
+    nominal, log = plant.bank(noise).observers["nominal"], scheduled(plant.scheduler(), log)
     # Nothing measured yet, so this is the set that the observer starts from.
-    start = nominal.update(np.full(log.y.shape[1], np.nan), u=log.u[0], schedule=scheduled.schedule_at(0)).box
-    result = calibrate(nominal.model, scheduled, HPolytope.box(*start))
+    start = nominal.update(np.full(log.y.shape[1], np.nan), u=log.u[0], schedule=log.schedule_at(0)).box
+    result = calibrate(nominal.model, log, HPolytope.box(*start))
     return LogCalibration(plant.name, noise, log.time, result)

@@ -6,8 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 from svo.detection.detect import digest_of_alarm
 from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms
 from svo.isolation.architectures import ArchitectureII
@@ -18,7 +16,8 @@ from svo.logs.log import Log
 from svo.models.digest import ModelSample
 from svo.observers.window.chain import promises_of, prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
-from svo.plant import MonitoredPlant, in_architecture, schedule_of
+from svo.plant import MonitoredPlant, in_architecture
+from svo.plant.scheduling import scheduled
 
 
 class PlantModels:
@@ -38,9 +37,7 @@ class PlantModels:
 
     def __init__(self, plant: MonitoredPlant, log: Log) -> None:
         self._plant = plant
-        scheduler = plant.scheduler()
-        values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
-        self.log = replace(log, schedule=None if values[0] is None else np.array(values, dtype=float))
+        self.log = scheduled(plant.scheduler(), log)
 
     def bank(self, alarm: Alarm) -> Bank:
         """A fresh bank of the architecture and noise set that an alarm names."""

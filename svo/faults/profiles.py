@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import Array, expect, finite_array, is_finite_number, readings, real_array
+from svo.checks import Array, expect, finite_array, is_finite_number, positive_number, readings, real_array
 
 EDGE_TOLERANCE_S = 1e-9
 
@@ -55,7 +55,7 @@ class Ramp:
 
     def __post_init__(self) -> None:
         _check_finite("start", self.start)
-        _check_positive("duration", self.duration)
+        positive_number("duration", self.duration, "time in seconds")
 
     def value(self, t: ArrayLike) -> Array:
         """Fraction present at time t [s], of the shape of t."""
@@ -71,7 +71,7 @@ class Exponential:
 
     def __post_init__(self) -> None:
         _check_finite("start", self.start)
-        _check_positive("time_constant", self.time_constant)
+        positive_number("time_constant", self.time_constant, "time in seconds")
 
     def value(self, t: ArrayLike) -> Array:
         """Fraction present at time t [s], of the shape of t."""
@@ -88,7 +88,7 @@ class Intermittent:
 
     def __post_init__(self) -> None:
         _check_finite("start", self.start)
-        _check_positive("period", self.period)
+        positive_number("period", self.period, "time in seconds")
         expect(0 < self.duty < 1, "duty", self.duty, "a fraction of the period strictly between 0 and 1")
 
     def value(self, t: ArrayLike) -> Array:
@@ -124,7 +124,3 @@ def check_profile(profile: Any) -> None:
 
 def _check_finite(name: str, value: float) -> None:
     expect(is_finite_number(value), name, value, "a finite time in seconds")
-
-
-def _check_positive(name: str, value: float) -> None:
-    expect(is_finite_number(value) and value > 0, name, value, "a positive time in seconds")

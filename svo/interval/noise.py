@@ -161,9 +161,9 @@ def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
     single = len(several) > 0 and (several[0] is None or np.isscalar(several[0]) or getattr(several[0], "ndim", 1) == 0)
     found = []
     for i, record in enumerate([records] if single else several):
-        signal = real_array(f"record {i}", record, finite=False, missing=True)
-        if signal.ndim != 1:
-            raise ValueError(f"record {i} has shape {signal.shape}; expected (n,), or a sequence of such records")
+        signal = real_array(
+            f"record {i}", record, ("n",), meaning="or a sequence of such records", finite=False, missing=True
+        )
         signal = np.ascontiguousarray(signal[~np.isnan(signal)])
         if not signal.size or not np.isfinite(signal).all():
             raise ValueError(f"record {i} is empty or has infinite samples; expected finite numbers")

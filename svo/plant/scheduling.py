@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from svo.logs.log import Log
 
 
 @runtime_checkable
@@ -24,6 +27,12 @@ Scheduler = Callable[[NDArray[np.float64]], Any] | InputScheduler
 def schedule_of(scheduler: Scheduler, y: NDArray[np.float64], u: NDArray[np.float64]) -> Any:
     """The schedule of the next sample from its y (ny,) and u (nu,), by a ``scheduler`` of either kind."""
     return scheduler.with_input(y, u) if isinstance(scheduler, InputScheduler) else scheduler(y)
+
+
+def scheduled(scheduler: Scheduler, log: Log) -> Log:
+    """A ``log`` with the schedule that a fresh ``scheduler`` makes of its y and u."""
+    values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
+    return replace(log, schedule=None if values[0] is None else np.array(values, dtype=float))
 
 
 @runtime_checkable

@@ -163,9 +163,8 @@ def check_count(name: str, value: int, least: int) -> None:
 
 
 def _checked(residual: ArrayLike) -> Array:
-    r = real_array("residual", residual, finite=False, missing=True)
-    if r.ndim != 1:
-        raise ValueError(f"residual has shape {r.shape}; expected (K,): a test takes one residual, so run one for each")
+    meaning = "since a test takes one residual: run one for each"
+    r = real_array("residual", residual, ("K",), meaning=meaning, finite=False, missing=True)
     if np.isinf(r).any():
         raise ValueError(f"residual[{int(np.argmax(np.isinf(r)))}] is infinite; expected finite numbers or NaN")
     return r

@@ -6,7 +6,7 @@ from svo.store.joined import Joined
 from svo.store.lock import locked
 from svo.store.parts import Parts, Survey
 from svo.store.software import versions
-from svo.store.whole import digest_of, file_name, write_text, write_whole
+from svo.store.whole import digest_of, file_name, make_folder, write_text, write_whole
 
 __all__ = [
     "Identity",
@@ -16,6 +16,7 @@ __all__ = [
     "digest_of",
     "file_name",
     "locked",
+    "make_folder",
     "versions",
     "write_csv",
     "write_text",

@@ -12,7 +12,7 @@ from itertools import groupby
 from pathlib import Path
 
 from svo.store.parts import part_name
-from svo.store.whole import digest_of, remove_unfinished, write_text, write_whole
+from svo.store.whole import digest_of, write_text, write_whole
 
 
 @dataclass(frozen=True)
@@ -86,13 +86,6 @@ class Joined:
                 if run in digests:
                     _write_bytes(self.part(run), b"".join(lines))
         self.path.unlink()
-
-    def make(self) -> None:
-        """Make the folder of the runs' files, and remove what killed processes left unfinished in it."""
-        if self.folder.is_symlink():
-            raise ValueError(f"{self.folder} is a symbolic link; expected a folder of the study itself, so remove it")
-        self.folder.mkdir(exist_ok=True)
-        remove_unfinished(self.folder)
 
     def _concatenate(self, runs: list[int], target: Path) -> None:
         with target.open("wb") as out:

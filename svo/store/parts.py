@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 
 from svo.store.seal import Seal, read_seal
 from svo.store.tables import Format, Parquet
-from svo.store.whole import remove_unfinished, write_whole
+from svo.store.whole import write_whole
 
 Row = TypeVar("Row")
 _NAME = re.compile(r"run-(\d{6,})")
@@ -56,19 +56,6 @@ class Parts(Generic[Row]):
     study: str
     format: Format = field(default_factory=Parquet)
     runs: int | None = None
-
-    def make(self) -> None:
-        """Make the folder, and remove what killed processes left unfinished in it.
-
-        Raises
-        ------
-        ValueError
-            If the folder is a symbolic link, so that the parts would be written elsewhere.
-        """
-        if self.folder.is_symlink():
-            raise ValueError(f"{self.folder} is a symbolic link; expected a folder of the study itself, so remove it")
-        self.folder.mkdir(exist_ok=True)
-        remove_unfinished(self.folder)
 
     def path(self, run: int) -> Path:
         return self.folder / f"{part_name(run)}{self.format.suffix}"

@@ -39,6 +39,20 @@ def write_text(path: Path, text: str) -> None:
     write_whole(path, lambda file: file.write_text(text, encoding="utf-8"))
 
 
+def make_folder(folder: Path) -> None:
+    """Make the folder of a study's own files if need be, without what an interruption left unfinished in it.
+
+    Raises
+    ------
+    ValueError
+        If it is a symbolic link, so that the files would be written elsewhere.
+    """
+    if folder.is_symlink():
+        raise ValueError(f"{folder} is a symbolic link; expected a folder of the study itself, so remove it")
+    folder.mkdir(exist_ok=True)
+    remove_unfinished(folder)
+
+
 def remove_unfinished(folder: Path) -> None:
     """Remove what processes that were killed left of `write_whole`; only where no other one is writing."""
     for path in folder.glob(".unfinished-*"):
@@ -48,9 +62,8 @@ def remove_unfinished(folder: Path) -> None:
 
 def sync_folder(folder: Path) -> None:
     """Bring the names in a folder to the disk, where the system can."""
-    if os.name == "nt":  # a folder cannot be opened there
-        return
-    _sync(folder)
+    if os.name != "nt":  # a folder cannot be opened there
+        _sync(folder)
 
 
 def digest_of(path: Path) -> str:

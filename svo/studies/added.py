@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from svo.plant import AddedStudy, Exhibit
-from svo.store import Identity, Parts, locked, versions
+from svo.store import Identity, Parts, locked, make_folder, versions
 from svo.store.tables import Json
 from svo.studies.configuration import StudyConfiguration
 from svo.studies.engine import Place, Progress, complete_parts
@@ -46,7 +46,7 @@ def run_added(
     parts = _parts(added, folder)
     parts.folder.parent.mkdir(exist_ok=True)
     with locked(parts.folder.parent):
-        parts.make()
+        make_folder(parts.folder)
         complete_parts(
             partial(_one_row, added.work), added.jobs, parts, lambda job, error: [added.failed(job, error)], place,
             retry_failed=retry_failed, progress=progress,

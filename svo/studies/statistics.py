@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy import stats
 
 CONFIDENCE = 0.95
+Row = TypeVar("Row")
+
+
+def grouped(rows: Iterable[Row], *columns: str) -> dict[Any, list[Row]]:
+    """Rows of runs that did not fail, by their values in some columns, in the order in which these come first."""
+    groups: dict[Any, list[Row]] = {}
+    for row in rows:
+        if getattr(row, "error", None) is None:
+            groups.setdefault(tuple(getattr(row, name) for name in columns), []).append(row)
+    return groups
 
 
 @dataclass(frozen=True)

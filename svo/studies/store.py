@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic
 
-from svo.store import Identity, Joined, Parts, Survey, digest_of, locked, versions, write_whole
+from svo.store import Identity, Joined, Parts, Survey, digest_of, locked, make_folder, versions, write_whole
 from svo.store.lock import check_free
 from svo.store.parts import Row, part_name
 from svo.studies.attempt import Failed
@@ -80,8 +80,8 @@ class StudyStore(Generic[Row]):
             self._check_content(configuration, resume)
             if not self._identity.exists():
                 _identity(configuration, runs).write(self._identity)
-            self._parts().make()
-            self._joined.make()
+            for folder in (self.parts, self._joined.folder):
+                make_folder(folder)
             self._exemplars.mkdir(exist_ok=True)
             seals = self._survey().intact
             lost = self._joined.missing(_digests(seals, ALARMS))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from svo.detectors.detector import Setting
-from svo.store import Identity, Parts, locked, versions
+from svo.store import Identity, Parts, locked, make_folder, versions
 from svo.store.tables import Json
 from svo.studies.comparison.run import ComparedRun
 from svo.studies.comparison.tuning import Tuned
@@ -83,6 +83,6 @@ def comparison_parts(out: Path | None, configuration: Mapping[str, Any], resume:
             Parts(folder / "tuned", TunedRow, now.digest, Json()),
             Parts(folder / "judged", ComparedRun, now.digest, Json()),
         )
-        parts.tuned.make()
-        parts.judged.make()
+        make_folder(parts.tuned.folder)
+        make_folder(parts.judged.folder)
         yield parts

@@ -16,7 +16,7 @@ from svo.store import write_csv
 from svo.studies.comparison.comparison import Compared
 from svo.studies.comparison.run import ComparedRun
 from svo.studies.comparison.tuning import Tuned
-from svo.studies.statistics import Delays, Share
+from svo.studies.statistics import Delays, Share, grouped
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,7 @@ class ComparisonRow:
 
 def comparison_table(compared: Compared) -> list[ComparisonRow]:
     """Rows in the order of distributions, detectors and scenarios; runs that failed are left out."""
-    groups: dict[tuple[str, str, str, str], list[ComparedRun]] = {}
-    for run in (run for run in compared.rows if run.error is None):
-        groups.setdefault((run.distribution, run.detector, run.fault, run.profile), []).append(run)
+    groups = grouped(compared.rows, "distribution", "detector", "fault", "profile")
     healthy = {key[:2]: runs for key, runs in groups.items() if key[2] == HEALTHY}
     return [
         _row(key, runs, healthy[key[:2]], compared.kinds[key[1]], compared.tuned[key[:2]])

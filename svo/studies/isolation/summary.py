@@ -13,7 +13,7 @@ import numpy as np
 from svo.plant import HEALTHY
 from svo.store import write_csv
 from svo.studies.isolation.run import RunRow
-from svo.studies.statistics import Delays, Share
+from svo.studies.statistics import Delays, Share, grouped
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,8 @@ def summarise(rows: Iterable[RunRow]) -> list[ConditionSummary]:
 
     Runs that failed are left out.
     """
-    groups: dict[tuple[str, str, str, str | None], list[RunRow]] = {}
-    for row in (row for row in rows if row.error is None):
-        groups.setdefault((row.noise, row.fault, row.profile, row.architecture), []).append(row)
-    return [_summarise(*key, group) for key, group in groups.items()]
+    groups = grouped(rows, "noise", "fault", "profile", "architecture")
+    return [_summarise(key, group) for key, group in groups.items()]
 
 
 def write_summary(path: Path, summaries: Iterable[ConditionSummary]) -> None:
@@ -70,7 +68,8 @@ def to_json(summaries: Iterable[ConditionSummary]) -> list[dict[str, Any]]:
     return [asdict(summary) for summary in summaries]
 
 
-def _summarise(noise: str, fault: str, profile: str, architecture: str | None, rows: list[RunRow]) -> ConditionSummary:
+def _summarise(condition: tuple[str, str, str, str | None], rows: list[RunRow]) -> ConditionSummary:
+    noise, fault, profile, architecture = condition
     kept = Counter(row.alive_end or "none" for row in rows if fault != HEALTHY and row.isolation_delay_s is None)
     return ConditionSummary(
         noise=noise,

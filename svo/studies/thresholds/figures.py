@@ -13,7 +13,7 @@ from svo.store import file_name
 from svo.studies.drawing import STYLE, new_figure, save_picture
 from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
-from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary
+from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary, learning_records
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,9 +88,8 @@ def plot_times(ax: Axes, summaries: Sequence[DetectorSummary]) -> list[Any]:
             np.array([np.nan if d is None else d for d in (getattr(s.detect, q) for s in group)])
             for q in ("p05", "median", "p95")
         )
-        label = f"{records} learning record{'s' * (records > 1)}"
         artists.append(ax.vlines(at, low, high, color=_COLOURS.get(records, "0.4"), lw=1.5))
-        artists += ax.plot(at, median, "o", ms=4, color=_COLOURS.get(records, "0.4"), label=label)
+        artists += ax.plot(at, median, "o", ms=4, color=_COLOURS.get(records, "0.4"), label=learning_records(records))
     paper = [(detectors.index(s.detector), s.paper - s.start + s.Ts) for s in summaries if s.paper is not None]
     if paper:
         artists += ax.plot(*zip(*paper, strict=True), "D", ms=5, mfc="none", mec="black", label="paper")
@@ -106,8 +105,7 @@ def _assumption(summaries: Sequence[AssumptionSummary], windows: int) -> Figure:
     q = np.arange(1, windows + 1)
     for s in summaries:
         share = np.array([s.by_window.get(int(i), 0) / s.runs.of for i in q])
-        label = f"{s.records} learning record{'s' * (s.records > 1)}"
-        ax.plot(q, 100 * share, color=_COLOURS.get(s.records, "0.4"), label=label)
+        ax.plot(q, 100 * share, color=_COLOURS.get(s.records, "0.4"), label=learning_records(s.records))
     ax.set(xlabel="window length q [samples]", ylabel="fault-free runs that\nexceed λ_q [%]", ylim=(0, None))
     ax.legend()
     return figure

@@ -20,6 +20,7 @@ from svo.studies.thresholds.runner import read_rows
 from svo.studies.thresholds.summary import (
     AssumptionSummary,
     DetectorSummary,
+    learning_records,
     summarise,
     summarise_assumption,
     write_summary,
@@ -93,7 +94,7 @@ def _before_the_fault(summaries: Sequence[DetectorSummary]) -> list[str]:
             alarmed, runs = (sum(getattr(s.false_alarms, n) for s in faulty) for n in ("count", "of"))
             reached = sum(s.detect.reached.count for s in faulty)
             lines.append(
-                f"faulty runs, all detectors, {records} learning record{'s' * (records > 1)}: detected "
+                f"faulty runs, all detectors, {learning_records(records)}: detected "
                 f"{reached} of {runs}, alarm before the fault in {alarmed} of {runs}"
             )
     return lines

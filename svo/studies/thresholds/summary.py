@@ -9,7 +9,7 @@ from pathlib import Path
 
 from svo.plant import HEALTHY, fault_start
 from svo.store import write_csv
-from svo.studies.statistics import Delays, Share
+from svo.studies.statistics import Delays, Share, grouped
 from svo.studies.thresholds.run import DetectorRow, LearnsDetectors
 
 _HEADER = (
@@ -17,6 +17,11 @@ _HEADER = (
     *("median_s", "p05_s", "p95_s", "paper_s"),
     *("false_alarm_runs", "false_alarm_share", "false_alarm_low", "false_alarm_high"),
 )
+
+
+def learning_records(count: int) -> str:
+    """How many there are, in words."""
+    return f"{count} learning record{'s' * (count > 1)}"
 
 
 @dataclass(frozen=True)
@@ -77,30 +82,29 @@ def summarise(plant: LearnsDetectors, rows: Iterable[DetectorRow]) -> list[Detec
 
     Runs that failed are left out.
     """
-    groups: dict[tuple[str, str, str, int, str], list[DetectorRow]] = {}
-    for row in (row for row in rows if row.error is None):
-        groups.setdefault((row.noise, row.fault, row.profile, row.records, row.detector), []).append(row)
+    groups = grouped(rows, "noise", "fault", "profile", "records", "detector")
     return [
         DetectorSummary(
-            *key,
+            noise,
+            fault,
+            profile,
+            records,
+            detector,
             detect=Delays.of([row.detection_delay_s for row in group]),
             false_alarms=Share.true([row.false_alarm for row in group]),
-            start=fault_start(plant, key[1], key[2]),
+            start=fault_start(plant, fault, profile),
             Ts=plant.Ts,
-            paper=plant.detection_reference.get((key[1], key[2]), {}).get(key[4]),
+            paper=plant.detection_reference.get((fault, profile), {}).get(detector),
         )
-        for key, group in groups.items()
+        for (noise, fault, profile, records, detector), group in groups.items()
     ]
 
 
 def summarise_assumption(rows: Iterable[DetectorRow]) -> list[AssumptionSummary]:
     """One summary per noise set and number of records, of the fault-free runs; empty if there are none."""
-    groups: dict[tuple[str, int], dict[int, list[DetectorRow]]] = {}
-    for row in rows:
-        if row.fault == HEALTHY and row.error is None:
-            groups.setdefault((row.noise, row.records), {}).setdefault(row.run, []).append(row)
     found = []
-    for (noise, records), runs in groups.items():
+    for (noise, records), healthy in grouped((r for r in rows if r.fault == HEALTHY), "noise", "records").items():
+        runs = grouped(healthy, "run")
         violated = [group[0].violated for group in runs.values()]
         found.append(
             AssumptionSummary(

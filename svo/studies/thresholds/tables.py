@@ -8,7 +8,7 @@ from svo.plant import HEALTHY
 from svo.studies.statistics import Share
 from svo.studies.tables import TextTable
 from svo.studies.thresholds.run import LearnsDetectors
-from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary
+from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary, learning_records
 
 NEVER = "∞"
 _MOST_RANGES = 8
@@ -31,21 +31,18 @@ def detection_table(plant: LearnsDetectors, summaries: Sequence[DetectorSummary]
     if healthy:
         cells = (f"{healthy[d].false_alarms.count}/{healthy[d].false_alarms.of}" for d in detectors)
         rows.append(("no fault: runs with an alarm", "", *cells))
-    records = f"{summaries[0].records} learning record{'s' * (summaries[0].records > 1)}"
+    records = learning_records(summaries[0].records)
     title = f"Detection times in s, {summaries[0].noise} noise, {records}: median, 5–95 %, paper"
     return TextTable(title, ("scenario", "fault\nat", *detectors), tuple(rows), labels=1)
 
 
 def assumption_lines(summaries: Sequence[AssumptionSummary]) -> list[str]:
     """What became of assumption (7) and of the promise of no false alarm in fault-free runs."""
-    lines = []
-    for s in summaries:
-        records = f"{s.records} learning record{'s' * (s.records > 1)}"
-        lines.append(
-            f"{s.noise} noise, {records}: fault-free runs with an alarm of any detector {_with_interval(s.alarmed)}; "
-            f"assumption (7) fails at some q in {_with_interval(s.runs)}{_windows(s)}"
-        )
-    return lines
+    return [
+        f"{s.noise} noise, {learning_records(s.records)}: fault-free runs with an alarm of any detector "
+        f"{_with_interval(s.alarmed)}; assumption (7) fails at some q in {_with_interval(s.runs)}{_windows(s)}"
+        for s in summaries
+    ]
 
 
 def _cell(s: DetectorSummary) -> str:

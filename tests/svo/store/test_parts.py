@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from svo.store import Parts
+from svo.store import Parts, make_folder
 from svo.store.seal import read_seal
 from svo.store.tables import Format, Json, Parquet
 
@@ -29,7 +29,7 @@ FORMATS = pytest.mark.parametrize("format", [Parquet(), Json()], ids=["parquet",
 
 def parts(folder: Path, format: Format, study: str = "a") -> Parts[Weighing]:
     made = Parts(folder, Weighing, study, format)
-    made.make()
+    make_folder(made.folder)
     return made
 
 
