@@ -11,12 +11,9 @@ if TYPE_CHECKING:
     from svo.analysis.calibration import Calibration, calibrate
     from svo.analysis.distinguish import Distinguishability, distinguishability
     from svo.analysis.input_design import InputDesign, design_input
-    from svo.isolation.architectures import ArchitectureI, ArchitectureII
-    from svo.isolation.record import BankRecord, Verdict
+    from svo.isolation import ArchitectureI, ArchitectureII, BankRecord, Verdict
     from svo.logs.log import Log
-    from svo.models.model import UncertainModel
-    from svo.models.schedule_table import ScheduleTable
-    from svo.models.uncertainty import Uncertainty
+    from svo.models import ScheduleTable, UncertainModel, Uncertainty
     from svo.observers.polytope.observer import PolytopeObserver
     from svo.observers.window.chain import ChainCheck, LateMeasurement, prove_chain
     from svo.observers.window.observer import WindowObserver
@@ -46,9 +43,9 @@ __all__ = [
 ]
 
 _HOMES = {
-    "ArchitectureI": "svo.isolation.architectures",
-    "ArchitectureII": "svo.isolation.architectures",
-    "BankRecord": "svo.isolation.record",
+    "ArchitectureI": "svo.isolation",
+    "ArchitectureII": "svo.isolation",
+    "BankRecord": "svo.isolation",
     "Calibration": "svo.analysis.calibration",
     "ChainCheck": "svo.observers.window.chain",
     "ConstrainedZonotopeObserver": "svo.observers.zonotope.observer",
@@ -57,10 +54,10 @@ _HOMES = {
     "LateMeasurement": "svo.observers.window.chain",
     "Log": "svo.logs.log",
     "PolytopeObserver": "svo.observers.polytope.observer",
-    "ScheduleTable": "svo.models.schedule_table",
-    "UncertainModel": "svo.models.model",
-    "Uncertainty": "svo.models.uncertainty",
-    "Verdict": "svo.isolation.record",
+    "ScheduleTable": "svo.models",
+    "UncertainModel": "svo.models",
+    "Uncertainty": "svo.models",
+    "Verdict": "svo.isolation",
     "WindowObserver": "svo.observers.window.observer",
     "calibrate": "svo.analysis.calibration",
     "design_input": "svo.analysis.input_design",

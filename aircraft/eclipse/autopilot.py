@@ -10,7 +10,7 @@ from aircraft.eclipse.noise import NoiseSet
 from aircraft.eclipse.simulator import Controller, Surrogate
 from aircraft.eclipse.trim import Trim, gust_directions, level_trim, output_matrix
 from svo.checks import Array
-from svo.models.discretisation import zero_order_hold
+from svo.models import zero_order_hold
 
 DESIGN_AIRSPEED = 37.0
 INPUT_LOWER = np.array([-25.0, 0.0])  # elevator [deg], thrust command

@@ -10,7 +10,7 @@ from svo.detectors.detector import Detector
 from svo.detectors.residuals import residual_test_detectors
 from svo.detectors.standard import standard_detectors
 from svo.detectors.window_bank import WindowBank
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 HORIZONS = (5, 20)  # steps in the windows of the set-valued observers whose bounds are scaled
 STATED_HORIZON = 10  # the bank of the studies, with its bounds as they are

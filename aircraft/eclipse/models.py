@@ -23,8 +23,7 @@ from aircraft.eclipse.schedule import ScheduledBlocks
 from aircraft.eclipse.simulator import Surrogate
 from aircraft.eclipse.trim import gust_directions, level_trim, output_matrix
 from svo.checks import Array, sizes
-from svo.models.discretisation import zero_order_hold
-from svo.models.model import UncertainModel, Uncertainty
+from svo.models import UncertainModel, Uncertainty, zero_order_hold
 
 SPACING = 0.25  # of the table [m/s]; the interpolation error counts into the measured mismatch
 NAMES = {

@@ -18,11 +18,9 @@ from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
 from svo.checks import Array, expect, expect_one_of
 from svo.faults import SensorFault
-from svo.isolation.architectures import ArchitectureI, ArchitectureII
-from svo.isolation.bank import Bank
+from svo.isolation import ArchitectureI, ArchitectureII, Bank
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
-from svo.models.schedule_table import ScheduleTable
+from svo.models import ScheduleTable, UncertainModel
 from svo.observers.window.observer import WindowObserver
 from svo.plant import Column, Columns, Distribution, Reference, StatedFault
 

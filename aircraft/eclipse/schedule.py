@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from svo.checks import Array, chosen
-from svo.models.schedule_table import ScheduleTable
+from svo.models import ScheduleTable
 
 FILTER_TIME_S = 0.5
 

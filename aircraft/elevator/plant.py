@@ -23,10 +23,9 @@ from svo.interval import (
     first_order_model,
     first_order_schedule,
 )
-from svo.isolation.architectures import ArchitectureI
-from svo.isolation.bank import Bank
+from svo.isolation import ArchitectureI, Bank
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.window.observer import WindowObserver
 from svo.plant import HEALTHY, Column, Columns, Distribution, Reference
 

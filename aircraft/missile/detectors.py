@@ -20,7 +20,7 @@ from svo.detectors.standard import standard_detectors
 from svo.detectors.threshold import ThresholdDetector
 from svo.detectors.window_bank import WindowBank
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.residual_tests.interface import above
 
 HORIZONS = (5, 10)  # steps in the windows of the set-valued observers

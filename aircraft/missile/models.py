@@ -28,7 +28,7 @@ from aircraft.missile.airframe import INPUTS, Airframe
 from aircraft.missile.imu import SensorErrors
 from aircraft.missile.redundancy import ForceBalance
 from svo.checks import Array, expect, sizes
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 OUTPUTS = (9, 10, 11, 0, 1, 2)  # of the 15 measurements: velocity, acceleration
 SCHEDULING = (3, 4, 5, 8, 12, 13)  # rates, z, phi, theta; the schedule of a sample is all twelve, in this order

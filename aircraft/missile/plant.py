@@ -17,10 +17,9 @@ from aircraft.missile.scenarios import DM, DN, ETA, TS, Fault, Flights, locked, 
 from polytopes import HPolytope
 from svo.checks import Array
 from svo.faults import ActuatorFault, SensorFault, Step
-from svo.isolation.architectures import ArchitectureI
-from svo.isolation.bank import Bank
+from svo.isolation import ArchitectureI, Bank
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.window.observer import WindowObserver
 from svo.plant import HEALTHY, AddedStudy, Column, Columns, Distribution, Exhibit, Reference, StatedFault
 

@@ -20,8 +20,7 @@ from svo.analysis.explanation import NEGLIGIBLE, explain
 from svo.analysis.trajectory import Trajectory
 from svo.checks import Array, bounded_box, expect, is_count
 from svo.logs.log import Log, expect_log
-from svo.models.model import UncertainModel, expect_model
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm, UncertainModel, expect_model
 
 _ROOM = 1e-6  # relative: of bounds that are wide enough while the first sample of another is looked for
 

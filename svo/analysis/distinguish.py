@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.analysis.model_pair import ModelPair, PairSolution, Witness
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 
 @dataclass(frozen=True)

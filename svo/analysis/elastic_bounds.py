@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.models.model import UncertainModel
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm, UncertainModel
 
 Kind = Literal["noise", "disturbance", "Delta"]
 _KINDS: dict[str, Kind] = {"noise": "noise", "disturbances": "disturbance", "deltas": "Delta"}

@@ -15,8 +15,7 @@ from svo.analysis.lifted_rows import Channel, evaluate, line_rows, set_rows
 from svo.analysis.sparse_program import Columns, SparseProgram, Terms
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
-from svo.models.normal_form import NormalForm, set_in
+from svo.models import NormalForm, UncertainModel, set_in
 
 ROUNDING = 5e-10  # of the data: half of what `svo.analysis.explanation` allows, the other half is the solver's
 _HIGH_PRICE = 1e3

@@ -12,8 +12,7 @@ from svo.analysis.elastic_bounds import Bound, widened
 from svo.analysis.trajectory import Trajectory, lies_in, needed_by
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm, UncertainModel
 from svo.observers.window.observer import WindowObserver
 
 # Of the data, as the observers do: y = fl(C x + n) on a bound need not satisfy it. Theirs is a little wider.

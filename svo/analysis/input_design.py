@@ -24,7 +24,7 @@ from polytopes.signatures import options_by_name
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.model_pair import LEAST_SEPARATION, ModelPair
 from svo.checks import Array, expect, finite_array, is_count, is_finite_number, listed
-from svo.models.model import UncertainModel, expect_model
+from svo.models import UncertainModel, expect_model
 
 _ROUNDS = 60
 _DECREASE = 1e-4  # of the energy, relative, below which the iteration stops

@@ -15,7 +15,7 @@ from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.checks import Array, expect
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.base import Observer
 from svo.plant import HEALTHY, Plant, StatedFault
 

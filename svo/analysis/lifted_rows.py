@@ -14,8 +14,8 @@ import numpy as np
 from polytopes import HPolytope
 from svo.analysis.sparse_program import Columns, SparseProgram, Terms
 from svo.checks import Array
-from svo.models.model import UncertainModel
-from svo.models.normal_form import Integers, power
+from svo.models import UncertainModel, power
+from svo.models.normal_form import Integers
 from svo.observers.window_kernel import channel_count, channel_factors
 
 

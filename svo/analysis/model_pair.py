@@ -15,8 +15,8 @@ from svo.analysis.lifted_rows import LiftedSample, evaluate_with_rest, line_rows
 from svo.analysis.reachable_set import ReachableSet, product_bounds
 from svo.analysis.sparse_program import Columns, Solution, SparseProgram
 from svo.checks import Array, bounded_box, expect, finite_array, is_count
-from svo.models.model import UncertainModel, expect_model
-from svo.models.normal_form import Integers, NormalForm, exponents_of, set_in
+from svo.models import NormalForm, UncertainModel, expect_model, set_in
+from svo.models.normal_form import Integers, exponents_of
 
 # In noise widths (for exact sensors: in units of the output). Above what an observer's rounding slack can explain.
 LEAST_SEPARATION = 1e-6

@@ -17,7 +17,7 @@ from polytopes import HPolytope
 from polytopes.exact import ball_up
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm
 
 _NEAR = 1e-6  # share of the width of a set
 _BITS = 128  # besides those that growth asks for

@@ -10,7 +10,7 @@ import numpy as np
 from polytopes import HPolytope
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 VARIANCE_OF_BOUND = 1.0 / 3.0  # of a uniform variable on [-1, 1]
 

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from svo.checks import expect_one_of
 from svo.cli.destinations import writable_csv, writable_folder
 from svo.cli.frame import (
     KEPT,
@@ -165,6 +164,7 @@ def compare(
     with one_line_errors(KEPT):
         from dataclasses import replace
 
+        from svo.checks import expect_one_of
         from svo.cli.progress import progress
         from svo.studies.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
         from svo.studies.comparison.publish import publish_comparison, to_text

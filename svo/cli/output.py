@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from svo.analysis.isolability import Isolability
     from svo.detection.detect import Detection
-    from svo.isolation.alarms import AlarmCheck
+    from svo.isolation import AlarmCheck
     from svo.plant import Plant
     from svo.studies.isolation.summary import ConditionSummary
     from svo.studies.thresholds.results import DetectionStudy

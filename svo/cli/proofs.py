@@ -12,7 +12,7 @@ from svo.cli.options import AsJson
 from svo.cli.output import print_checks, print_json
 
 if TYPE_CHECKING:
-    from svo.isolation.alarms import AlarmCheck
+    from svo.isolation import AlarmCheck
 
 
 _WHY_EMPTY = "no model was falsified in what wrote it, or the file was cut off"
@@ -63,7 +63,7 @@ def verify(
 
 
 def _checks(path: Path, log: Path | None, full: Path | None) -> list[AlarmCheck]:
-    from svo.isolation.alarms import read_alarms, verify_alarms
+    from svo.isolation import read_alarms, verify_alarms
 
     if log is not None and full is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")

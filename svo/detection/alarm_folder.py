@@ -14,7 +14,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from svo.isolation.alarms import Alarm, alarm_line
+from svo.isolation import Alarm
+from svo.isolation.alarms import alarm_line
 from svo.store import locked, write_text
 
 ALARMS = "alarms.jsonl"

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
-from svo.isolation.alarms import Alarm, write_alarms
-from svo.isolation.record import BankRecord, Recorder
+from svo.isolation import Alarm, BankRecord, Recorder, write_alarms
 from svo.logs.columns import check_times
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
-from svo.models.digest import model_digest
+from svo.models import model_digest
 from svo.observers.base import Certificate, Observer
 from svo.plant import MonitoredPlant, architecture_of, schedule_of
 from svo.plant.protocol import expect_plant

@@ -7,13 +7,10 @@ from pathlib import Path
 from time import perf_counter
 
 from svo.detection.detect import digest_of_alarm
-from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms
-from svo.isolation.architectures import ArchitectureII
-from svo.isolation.bank import Bank
-from svo.isolation.logic import GLOBAL
+from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.models.digest import ModelSample
+from svo.models import ModelSample
 from svo.observers.window.chain import promises_of, prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
 from svo.plant import MonitoredPlant, in_architecture

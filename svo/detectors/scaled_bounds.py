@@ -8,7 +8,7 @@ import numpy as np
 
 from svo.checks import expect
 from svo.faults.blocks import disturbance_edges, mapped, with_noise
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 
 def scaled_bounds(model: UncertainModel, scale: float) -> UncertainModel:

@@ -13,10 +13,10 @@ from polytopes import HPolytope
 from svo.checks import Array
 from svo.detectors.detector import NOBODY, Detection, Kind, Parameter, Setting
 from svo.detectors.scaled_bounds import scaled_bounds
-from svo.isolation.architectures import ArchitectureI
+from svo.isolation import ArchitectureI
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.window.observer import WindowObserver
 
 NOMINAL = "nominal"

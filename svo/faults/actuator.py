@@ -21,7 +21,7 @@ from svo.faults.blocks import (
     without_columns,
 )
 from svo.faults.profiles import EDGE_TOLERANCE_S, Profile, Step, at_times, check_profile
-from svo.models.model import UncertainModel, Uncertainty
+from svo.models import UncertainModel, Uncertainty
 
 ActuatorKind = Literal[
     "loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid", "noise"

@@ -10,8 +10,8 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.checks import Array, expect, finite_array, floats, is_count
-from svo.models.model import Schedulable, UncertainModel, Uncertainty
-from svo.models.schedule_table import ScheduleTable, values_over
+from svo.models import Schedulable, ScheduleTable, UncertainModel, Uncertainty
+from svo.models.schedule_table import values_over
 
 
 def mapped(function: Callable[..., Array], *values: Schedulable) -> Schedulable:

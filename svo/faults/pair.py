@@ -10,7 +10,7 @@ from svo.faults.actuator import ActuatorFault
 from svo.faults.blocks import channels
 from svo.faults.plant import PlantFault
 from svo.faults.sensor import SensorFault
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 Fault = ActuatorFault | PlantFault | SensorFault
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from svo.checks import Array, expect, finite_array, is_finite_number
 from svo.faults.profiles import Profile, check_profile
-from svo.models.model import UncertainModel, Uncertainty
+from svo.models import UncertainModel, Uncertainty
 
 
 @dataclass(frozen=True)

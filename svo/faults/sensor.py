@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from svo.checks import Array, expect_one_of, is_finite_number
 from svo.faults.blocks import channels, check_channels, mapped, only_columns, only_rows, product_of, with_noise
 from svo.faults.profiles import Profile, at_times, check_profile
-from svo.models.model import Schedulable, UncertainModel, Uncertainty
+from svo.models import Schedulable, UncertainModel, Uncertainty
 
 SensorKind = Literal["bias", "drift", "scaling", "hard"]
 

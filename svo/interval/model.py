@@ -17,8 +17,7 @@ import numpy as np
 from svo.checks import Array
 from svo.interval.predictor import IntervalPrediction, IntervalPredictor
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
-from svo.models.uncertainty import Uncertainty
+from svo.models import UncertainModel, Uncertainty
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,23 @@
+"""Isolation banks: observers of several models beside one another, what they conclude, and alarms with their proofs."""
+
+from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms, write_alarms
+from svo.isolation.architectures import ArchitectureI, ArchitectureII
+from svo.isolation.bank import Bank
+from svo.isolation.logic import GLOBAL, NOMINAL
+from svo.isolation.record import BankRecord, Recorder, Verdict
+
+__all__ = [
+    "GLOBAL",
+    "NOMINAL",
+    "Alarm",
+    "AlarmCheck",
+    "ArchitectureI",
+    "ArchitectureII",
+    "Bank",
+    "BankRecord",
+    "Recorder",
+    "Verdict",
+    "read_alarms",
+    "verify_alarms",
+    "write_alarms",
+]

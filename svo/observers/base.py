@@ -19,7 +19,7 @@ from polytopes import HPolytope
 from svo.checks import Array, is_count
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.models.model import UncertainModel, expect_model
+from svo.models import UncertainModel, expect_model
 from svo.observers.answers import Record, Step, VerdictName
 from svo.observers.certificate import Certificate
 from svo.observers.data import (

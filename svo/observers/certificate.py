@@ -9,7 +9,7 @@ import numpy as np
 
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.digest import ModelSample
+from svo.models import ModelSample
 from svo.store.values import decode_value, encode_value
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from svo.checks import Array, finite_array, floats, is_finite_number, real_number
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 
 def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:

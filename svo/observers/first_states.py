@@ -6,7 +6,7 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.checks import Array, bounded_box
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 
 def first_box(P: HPolytope, model: UncertainModel) -> tuple[Array, Array]:

@@ -13,7 +13,8 @@ import numpy as np
 from polytopes import Certificate, HPolytope
 from polytopes.exact import rational
 from svo.checks import Array
-from svo.models.normal_form import NormalForm, lengthened
+from svo.models import NormalForm
+from svo.models.normal_form import lengthened
 from svo.observers.polytope.certificate import (
     AnyCertificate,
     MeasuredOutput,

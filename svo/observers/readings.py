@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from svo.checks import Array
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.free_start import Reading, state_bounds
 from svo.observers.window_kernel import LARGEST
 

@@ -11,8 +11,7 @@ from abc import abstractmethod
 from typing import Any, Generic, TypeVar
 
 from svo.checks import Array
-from svo.models.model import UncertainModel
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm, UncertainModel
 from svo.observers.answers import Step
 from svo.observers.base import Observer
 from svo.observers.free_start import Reading

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.models.digest import ModelSample, Options, model_digest
-from svo.models.model import UncertainModel
+from svo.models import ModelSample, UncertainModel, model_digest
+from svo.models.digest import Options
 
 Value = TypeVar("Value")
 State = Mapping[str, NDArray[Any]]

@@ -15,10 +15,10 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.isolation.bank import Bank
+from svo.isolation import Bank
 from svo.logs.log import Log
 from svo.logs.names import Columns
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.plant.scheduling import Scheduler
 
 HEALTHY = "none"

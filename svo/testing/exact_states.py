@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 Point = tuple[Fraction, ...]
 

@@ -14,7 +14,7 @@ from polytopes import HPolytope
 from svo.checks import Array
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.testing.exact_states import Point, exactly, product
 from svo.testing.rules import NotApplicable
 from svo.testing.systems import PLAIN, System

@@ -10,9 +10,9 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.checks import Array
-from svo.isolation.bank import Bank
+from svo.isolation import Bank
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.plant import HEALTHY, MonitoredPlant, Plant, fault_start
 from svo.testing.rules import NotApplicable
 

@@ -16,8 +16,7 @@ import numpy as np
 from polytopes import HPolytope
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.model import UncertainModel
-from svo.models.uncertainty import Uncertainty
+from svo.models import UncertainModel, Uncertainty
 from svo.testing.exact_states import Point, exact_states
 
 

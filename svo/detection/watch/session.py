@@ -17,9 +17,7 @@ from svo.detection.detect import digest_of_alarm, source_of_bank
 from svo.detection.watch.lines import Line, Notice
 from svo.detection.watch.rows import RowReader
 from svo.detection.watch.timeline import Event, Row, Timeline
-from svo.isolation.alarms import Alarm
-from svo.isolation.logic import GLOBAL
-from svo.isolation.record import Verdict
+from svo.isolation import GLOBAL, Alarm, Verdict
 from svo.logs.drive import advance
 from svo.plant import MonitoredPlant, resume_schedule, saved_schedule, schedule_of
 from svo.plant.description import description_digest

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from svo.detection.watch.session import Counts, Session, Status
-from svo.isolation.alarms import Alarm
+from svo.isolation import Alarm
 from svo.terminal import line
 
 SECONDS_BETWEEN_PICTURES = 0.1

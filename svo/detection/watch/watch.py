@@ -15,7 +15,7 @@ from svo.detection.watch.session import Session
 from svo.detection.watch.silence import Silence
 from svo.detection.watch.timeline import Event as LogEvent
 from svo.detection.watch.view import View
-from svo.isolation.alarms import Alarm
+from svo.isolation import Alarm
 
 WAIT_SECONDS = 0.05
 SECONDS_BETWEEN_STATES = 1.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.checks import Array
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.models.state_range import StateRange
 from svo.observers.answers import between
 from svo.observers.polytope.sets import Sample

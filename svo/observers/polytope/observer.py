@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from polytopes import HPolytope, UndecidedError, warm_up
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
-from svo.models.model import UncertainModel
-from svo.models.normal_form import NormalForm, set_in
-from svo.models.stack import may_be_nonzero
+from svo.models import NormalForm, UncertainModel, may_be_nonzero, set_in
 from svo.observers.answers import Step
 from svo.observers.data import relative_slack, stack_at
 from svo.observers.first_states import finite_box

@@ -6,7 +6,7 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.checks import Array
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.polytope.vertex_images import outer_support, reach_of
 
 _ROUNDING = 2.0**-51  # of the terms of a row, for each of them

@@ -10,7 +10,7 @@ import numpy as np
 
 from polytopes import HPolytope, UndecidedError
 from svo.checks import Array
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.answers import VerdictName
 from svo.observers.polytope.certificate import (
     AnyCertificate,

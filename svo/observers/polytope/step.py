@@ -8,7 +8,7 @@ import numpy as np
 
 from polytopes import HPolytope
 from svo.checks import Array
-from svo.models.normal_form import NormalForm, set_in
+from svo.models import NormalForm, set_in
 from svo.observers.answers import Step
 from svo.observers.polytope.vertex_images import outer_support
 from svo.observers.readings import OUTGROWN

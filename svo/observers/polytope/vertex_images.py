@@ -15,7 +15,7 @@ from scipy.spatial import QhullError
 
 from polytopes import HPolytope, ProjectionLimitError, UndecidedError, convex_hull
 from svo.checks import Array
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 
 EXACT_FACETS = 500
 """Facets of one set beyond which exact mode gives up."""

@@ -17,8 +17,7 @@ from flint import fmpq
 
 from svo.checks import Array
 from svo.logs.log import Log
-from svo.models.digest import ModelSample
-from svo.models.normal_form import Exponents, power
+from svo.models import Exponents, ModelSample, power
 from svo.observers.certificate import Certificate, started_again
 from svo.observers.free_start import Reading, state_bounds
 from svo.observers.window.evidence import ArrivalSet, WindowEvidence, WindowSample

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.models.normal_form import Exponents
+from svo.models import Exponents
 
 
 @dataclass(frozen=True, eq=False)

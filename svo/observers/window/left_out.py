@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from polytopes.exact import ZERO, rational
 from svo.checks import Array
-from svo.models.normal_form import Exponents, power
+from svo.models import Exponents, power
 from svo.observers.window.evidence import WindowEvidence, WindowSample
 from svo.observers.window_kernel import channel_factors
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm
 from svo.observers import window_kernel as kernel
 from svo.observers.window.output_injection import OutputInjection, can_inject
 from svo.observers.window.setup import channel_owners, disturbance_rows, jitter, output_is_disturbed

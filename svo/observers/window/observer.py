@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
-from svo.models.model import UncertainModel
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm, UncertainModel
 from svo.observers import window_kernel as kernel
 from svo.observers.answers import VerdictName
 from svo.observers.base import Observer

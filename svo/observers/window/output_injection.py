@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from svo.checks import Array
-from svo.models.model import UncertainModel
-from svo.models.stack import may_be_nonzero
+from svo.models import UncertainModel, may_be_nonzero
 from svo.observers.window.certificate import WindowCertificate, certificate_from
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window_kernel import BASE, TIME, Sizes

@@ -7,9 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from svo.checks import Array, expect, real_array
-from svo.models.model import UncertainModel
-from svo.models.normal_form import NormalForm
-from svo.models.stack import may_be_nonzero
+from svo.models import NormalForm, UncertainModel, may_be_nonzero
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window_kernel import channel_count
 

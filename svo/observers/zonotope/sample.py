@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from polytopes.exact import rounded_up
 from svo.checks import Array
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm
 from svo.observers.given_units import zonotope_proof_out
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import ArrivalSet, WindowSample

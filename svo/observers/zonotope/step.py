@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from svo.checks import Array
-from svo.models.normal_form import NormalForm
+from svo.models import NormalForm
 from svo.observers.answers import Step
 from svo.observers.given_units import zonotope_out
 from svo.observers.zonotope.program import ZonotopeProgram

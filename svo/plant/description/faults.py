@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from svo.faults import ActuatorFault, PlantFault, SensorFault, Step
-from svo.isolation.logic import GLOBAL, NOMINAL
-from svo.models.model import UncertainModel
-from svo.models.uncertainty import Uncertainty
+from svo.isolation import GLOBAL, NOMINAL
+from svo.models import UncertainModel, Uncertainty
 from svo.plant.description.model import ARRAYS, arrays_of, remainder_of
 from svo.plant.description.table import Table
 

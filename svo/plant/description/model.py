@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from polytopes import HPolytope
+from svo.models import UncertainModel, Uncertainty
 from svo.models.mat import read_arrays
-from svo.models.model import UncertainModel
-from svo.models.uncertainty import Uncertainty
 from svo.plant.description.table import Table
 
 ARRAYS = ("A", "B", "a", "E", "C", "D", "c", "F")

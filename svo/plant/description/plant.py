@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from polytopes import HPolytope
 from svo.checks import expect
 from svo.interval.on_log import ThresholdDetection, detect_thresholds
-from svo.isolation.architectures import ArchitectureI, ArchitectureII
-from svo.isolation.bank import Bank
+from svo.isolation import ArchitectureI, ArchitectureII, Bank
 from svo.logs.log import Log
 from svo.logs.names import Column, Columns
-from svo.models.model import UncertainModel
+from svo.models import UncertainModel
 from svo.observers.window.observer import WindowObserver
 from svo.plant import no_schedule
 from svo.plant.description.faults import FaultModel, faults_of

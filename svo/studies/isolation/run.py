@@ -8,8 +8,7 @@ import numpy as np
 
 from svo.detection.detect import alarms_of, source_of_bank
 from svo.indices import judge_alarm
-from svo.isolation.alarms import Alarm
-from svo.isolation.record import BankRecord
+from svo.isolation import Alarm, BankRecord
 from svo.logs.log import Log
 from svo.plant import HEALTHY, Plant, first_faulty_sample, in_architecture
 from svo.studies.configuration import Job

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from svo.isolation.alarms import write_alarms
+from svo.isolation import write_alarms
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.run import RunOutcome, RunRow
 from svo.studies.store import ALARMS, SAMPLES, StudyStore, Written
