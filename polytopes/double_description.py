@@ -83,7 +83,7 @@ def _pointed_rays(G: Integers, max_rays: int) -> Integers:
     G = G[_good_order(G)]
     start = _independent(G)
     rays = _simplex(G[start])
-    table = _joined(rays, _product(rays, G))
+    table = np.hstack([rays, _product(rays, G)])  # of objects, if one of them is
     on = np.zeros((len(rays), (m + 63) // 64), dtype=np.uint64)  # a bit for each row taken that the ray lies on
     for i in start:
         _mark(on, i, table[:, d + i] == 0)
@@ -131,11 +131,6 @@ def _product(rays: Integers, G: Integers) -> Integers:
 
 def _largest(table: Integers) -> int:
     return int(np.abs(table).max(initial=0))
-
-
-def _joined(left: Integers, right: Integers) -> Integers:
-    joined: Integers = np.hstack([left, right])  # object, if one of them is
-    return joined
 
 
 def _mark(on: Words, i: int, which: NDArray[np.bool_]) -> None:

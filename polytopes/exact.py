@@ -6,7 +6,7 @@ Every finite float is a rational number, so a linear combination of rows of floa
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from flint import arb, fmpq, fmpq_mat, fmpz
+from flint import arb, arb_mat, fmpq, fmpq_mat, fmpz
 from numpy.typing import NDArray
 
 Multipliers = dict[int, fmpq]  # row index -> multiplier; rows that are absent have multiplier zero
@@ -37,6 +37,12 @@ def ball_up(value: arb) -> float:
     top = value.upper()
     nearest = float(top)
     return nearest if not top > arb(nearest) else float(np.nextafter(nearest, np.inf))
+
+
+def ball_matrix(matrix: NDArray[np.float64]) -> arb_mat:
+    """The same numbers, exactly."""
+    rows, columns = matrix.shape
+    return arb_mat(rows, columns, [arb(v) for v in matrix.ravel().tolist()])
 
 
 def rational_vector(values: NDArray[np.float64]) -> list[fmpq]:

@@ -34,7 +34,7 @@ class Identification:
     errors: dict[str, float]
 
 
-def identify(derivatives: Derivatives | None = None) -> Identification:
+def identify() -> Identification:
     """Least-squares fit of the surrogate's trimmed linearisation to A(V) and B(V) over 25 to 55 m/s.
 
     Each entry's error is divided by the rms of that entry over the airspeeds, so that all derivatives
@@ -45,7 +45,7 @@ def identify(derivatives: Derivatives | None = None) -> Identification:
     RuntimeError
         If the fit does not converge.
     """
-    derivatives = Derivatives() if derivatives is None else derivatives
+    derivatives = Derivatives()
 
     def residual(scaled: Array) -> Array:
         return _errors(Surrogate(*(scaled * _SCALE)), derivatives)[1].ravel()

@@ -14,7 +14,7 @@ from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from polytopes.exact import ball_up
+from polytopes.exact import ball_matrix, ball_up
 from svo.checks import Array
 from svo.logs.log import Log
 from svo.models import NormalForm
@@ -71,9 +71,9 @@ class _Step:
 
     def split(self) -> tuple[arb_mat, arb_mat]:
         """The matrix of x, and what is added."""
-        total = _matrix(self.stacks[0])
+        total = ball_matrix(self.stacks[0])
         for delta, stack in zip(self.deltas, self.stacks[1:], strict=True):
-            total += _matrix(stack) * arb(float(delta))
+            total += ball_matrix(stack) * arb(float(delta))
         n = self.total.shape[1] - len(self.others)
         rows = total.tolist()
         return arb_mat([row[:n] for row in rows]), arb_mat([row[n:] for row in rows]) * _column(self.others)
@@ -141,8 +141,3 @@ def _is_physical(x: arb_mat, form: NormalForm) -> bool:
 
 def _column(values: Array) -> arb_mat:
     return arb_mat(len(values), 1, [arb(float(v)) for v in values])
-
-
-def _matrix(array: Array) -> arb_mat:
-    rows, columns = array.shape
-    return arb_mat(rows, columns, [arb(float(v)) for v in array.ravel()])

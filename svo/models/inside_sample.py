@@ -10,7 +10,7 @@ import math
 import numpy as np
 from flint import arb, arb_mat, ctx
 
-from polytopes.exact import ball_up
+from polytopes.exact import ball_matrix, ball_up
 from svo.checks import Array
 
 _BITS = 512  # states in units of 2^-80 to 2^80 keep a float's digits
@@ -24,7 +24,7 @@ def exponential(M: Array, Ts: float) -> Array:
     bits = _BITS
     while True:
         with ctx.workprec(bits):
-            entries = (_exact(M) * arb(Ts)).exp().tolist()
+            entries = (ball_matrix(M) * arb(Ts)).exp().tolist()
             if bits >= _MOST_BITS or all(_is_settled(v) for row in entries for v in row):
                 return np.array([[float(v.mid()) for v in row] for row in entries])
         bits *= 2
@@ -44,7 +44,9 @@ def growth(A: Array, Ts: float) -> Array:
     zero, one = np.zeros((n, n)), np.eye(n)
     with ctx.workprec(_BITS):
         # The last block of the first row of the exponential of this extension is the integral.
-        joint = (_exact(np.block([[_metzler(A), one, zero], [zero, zero, one], [zero, zero, zero]])) * arb(Ts)).exp()
+        joint = (
+            ball_matrix(np.block([[_metzler(A), one, zero], [zero, zero, one], [zero, zero, zero]])) * arb(Ts)
+        ).exp()
         return _rounded_up([[joint[i, 2 * n + j] for j in range(n)] for i in range(n)])
 
 
@@ -58,9 +60,9 @@ def departure(A: Array, M: Array, held: Array, Ts: float) -> Array:
     parts = _parts(A, Ts)
     with ctx.workprec(_BITS):
         length = arb(Ts) / parts
-        a, mean = _exact(A), _exact(held) / arb(Ts)
-        move, grow = (a * length).exp(), (_exact(np.maximum(_metzler(A), 0.0)) * length).exp()
-        now, total = _exact(M), arb_mat(*M.shape)
+        a, mean = ball_matrix(A), ball_matrix(held) / arb(Ts)
+        move, grow = (a * length).exp(), (ball_matrix(np.maximum(_metzler(A), 0.0)) * length).exp()
+        now, total = ball_matrix(M), arb_mat(*M.shape)
         before = _absolute(now - mean)
         for _ in range(parts):
             bend = grow * _absolute(a * (a * now))
@@ -93,10 +95,6 @@ def _parts(A: Array, Ts: float) -> int:
 
 def _metzler(A: Array) -> Array:
     return np.where(np.eye(len(A), dtype=bool), A, np.abs(A))
-
-
-def _exact(A: Array) -> arb_mat:
-    return arb_mat([[arb(v) for v in row] for row in A.tolist()]) if A.size else arb_mat(*A.shape)
 
 
 def _absolute(M: arb_mat) -> arb_mat:

@@ -48,6 +48,11 @@ class StateRange:
         return np.where(np.isfinite(total), total, np.inf) + 4.0 * (directions.shape[1] + 1) * _EPS * terms
 
 
+def within(physical: StateRange | None, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """A box within a range, if there is one; where they do not meet, as it is."""
+    return (lower, upper) if physical is None else physical.cut(lower, upper)[:2]
+
+
 def state_range(name: str, value: Any, n: int, bounded: bool) -> StateRange | None:
     """From an argument (lower, upper) of a model; a number stands for every state.
 

@@ -67,8 +67,7 @@ class Certificate(ABC):
         TypeError
             If the proof is none about the model, so that it cannot be stored.
         """
-        record: dict[str, Any] = encode_value(self)
-        return record
+        return dict(encode_value(self))
 
     @classmethod
     def from_dict(cls, record: Any) -> Self:

@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from svo.checks import Array
 from svo.models import NormalForm, UncertainModel
+from svo.models.state_range import within
 from svo.observers.answers import Step
 from svo.observers.base import Observer
 from svo.observers.free_start import Reading
@@ -126,10 +127,8 @@ class RecursiveObserver(Observer, Generic[Data]):
 
     def _start_again(self, samples: list[Reading], lower: Array, upper: Array) -> Step | None:
         """From bounds of the state at the first of some samples; None if a set does not come out of it."""
-        physical, step = self._normal.physical_range, None
-        if physical is not None:
-            lower, upper, _ = physical.cut(lower, upper)
-        self._start_from(lower, upper)
+        self._start_from(*within(self._normal.physical_range, lower, upper))
+        step = None
         for j, s in enumerate(samples):
             data = self._again(s, self._number - len(samples) + 1 + j)
             step = self._begin(data) if j == 0 else self._go_on(samples[j - 1].u, data)

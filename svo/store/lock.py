@@ -30,7 +30,8 @@ def locked(folder: Path) -> Iterator[None]:
         except OSError as error:
             raise ValueError(_who(folder, file)) from error
         file.truncate(0)
-        json.dump({"pid": os.getpid(), "host": socket.gethostname(), "since": _now()}, file)
+        since = datetime.now(UTC).isoformat(timespec="seconds")
+        json.dump({"pid": os.getpid(), "host": socket.gethostname(), "since": since}, file)
         file.flush()
         try:
             yield
@@ -53,10 +54,6 @@ def _who(folder: Path, file: IO[str]) -> str:
         found = json.loads(file.read())
         holder = f"process {found['pid']} on {found['host']}, since {found['since']}"
     return f"{folder} is in use by {holder}; wait until it is done, or stop it first"
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 if os.name == "nt":

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from svo.checks import optional_import
 from svo.store import versions
 from svo.studies.attempt import Failed, Job, Outcome, attempt
 
@@ -48,7 +49,7 @@ def outcomes_on_cluster(
     RuntimeError
         If a worker has other versions of the software, or the scheduler is lost.
     """
-    _need_distributed()
+    optional_import("distributed", "cluster", "studies on a cluster")  # which also sets the levels of its loggers
     with _quiet(), _connected(scheduler) as client, _scheduler_there(scheduler):
         _check_workers(client, scheduler)
         yield from _run_all(client, work, jobs)
@@ -111,14 +112,6 @@ def _result(future: Any) -> Any:
         return Failed(f"several workers died on it ({error})")
     finally:
         future.release()
-
-
-def _need_distributed() -> None:
-    """Import it, which also sets the levels of its loggers."""
-    try:
-        import distributed  # noqa: F401
-    except ImportError as error:
-        raise ImportError("--scheduler needs the extra 'cluster': pip install 'svo-fdi[cluster]'") from error
 
 
 def _connected(scheduler: str) -> Client:

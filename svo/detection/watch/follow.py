@@ -10,6 +10,7 @@ files beside it whose names begin with the log's (``log.csv.1``), as ``copytrunc
 
 from __future__ import annotations
 
+import glob
 import os
 import stat
 from collections.abc import Callable, Mapping
@@ -168,7 +169,7 @@ class FileLines:
 
     def _go_on_beside(self) -> list[Line | Notice] | None:
         """Open a file beside the log's that goes on from what was read of the log."""
-        for path in sorted(self._path.parent.glob(f"{_escaped(self._path.name)}?*")):
+        for path in sorted(self._path.parent.glob(f"{glob.escape(self._path.name)}?*")):
             try:
                 file = _opened(path)
             except OSError:
@@ -205,8 +206,3 @@ def lines_of(log: str, until_end: bool) -> Lines:
 
 def _opened(path: Path) -> BinaryIO:
     return path.open("rb", buffering=0)
-
-
-def _escaped(name: str) -> str:
-    """A name in a pattern of `Path.glob`."""
-    return "".join(f"[{c}]" if c in "*?[" else c for c in name)

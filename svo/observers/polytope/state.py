@@ -8,11 +8,12 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes import Certificate, HPolytope
+from polytopes import HPolytope
 from svo.observers.answers import VerdictName
-from svo.observers.polytope.certificate import AnyCertificate, PolytopeCertificate, PublishedCertificate
+from svo.observers.polytope.certificate import PolytopeCertificate, PublishedCertificate
 from svo.observers.polytope.sets import Outcome, Sample
 from svo.observers.saved_state import arrays_of, read_arrays
+from svo.store.values import decode_value, encode_value
 
 State = dict[str, NDArray]
 VERDICTS: tuple[VerdictName, ...] = ("consistent", "falsified", "undecided")
@@ -38,27 +39,22 @@ def write_outcome(name: str, outcome: Outcome) -> State:
     state: State = {f"{name}.verdict": np.array(VERDICTS.index(outcome.verdict))}
     state |= arrays_of(f"{name}.joint", outcome.joint)
     state |= _write_groups(f"{name}.memory", outcome.memory)
-    state[f"{name}.proofs"] = np.array([len(group) for group in outcome.proofs], dtype=np.int64)
-    for i, group in enumerate(outcome.proofs):
-        for j, proof in enumerate(group):
-            state |= _write_proof(f"{name}.proofs.{i}.{j}", proof)
-    return state | _write_certificate(f"{name}.certificate", outcome.certificate)
+    published = isinstance(outcome.certificate, PublishedCertificate)
+    state[f"{name}.proofs"] = np.array(json.dumps(encode_value((published, outcome.certificate, outcome.proofs))))
+    return state
 
 
 def read_outcome(state: Mapping[str, NDArray], name: str) -> Outcome:
     """What `write_outcome` wrote; ValueError if it claims a falsification that its certificate does not prove."""
-    verdict, certificate = VERDICTS[int(state[f"{name}.verdict"])], _read_certificate(state, f"{name}.certificate")
+    verdict = VERDICTS[int(state[f"{name}.verdict"])]
+    published, record, proofs = json.loads(str(state[f"{name}.proofs"]))
+    kind = PublishedCertificate if published else PolytopeCertificate
+    certificate = None if record is None else decode_value(kind, record)
     if verdict == "falsified" and (certificate is None or not certificate.verify()):
         raise ValueError("its falsification cannot be proven again")
+    joint, memory = read_arrays(HPolytope, f"{name}.joint", state), _read_groups(state, f"{name}.memory")
     return Outcome(
-        verdict,
-        certificate,
-        read_arrays(HPolytope, f"{name}.joint", state),
-        _read_groups(state, f"{name}.memory"),
-        tuple(
-            tuple(_read_proof(state, f"{name}.proofs.{i}.{j}") for j in range(count))
-            for i, count in enumerate(state[f"{name}.proofs"])
-        ),
+        verdict, certificate, joint, memory, decode_value(tuple[tuple[PolytopeCertificate, ...], ...], proofs)
     )
 
 
@@ -78,36 +74,3 @@ def _read_groups(state: Mapping[str, NDArray], name: str) -> tuple[tuple[HPolyto
         tuple(read_arrays(HPolytope, f"{name}.{i}.{j}", state) for j in range(count))
         for i, count in enumerate(state[name])
     )
-
-
-def _write_proof(name: str, proof: PolytopeCertificate) -> State:
-    state: State = {f"{name}.sample": np.array(proof.sample)}
-    state[f"{name}.multipliers"] = np.array(json.dumps(proof.multipliers.to_dict()))
-    return state | arrays_of(f"{name}.rows", proof.measurement) | _write_groups(f"{name}.before", [proof.before])
-
-
-def _read_proof(state: Mapping[str, NDArray], name: str) -> PolytopeCertificate:
-    multipliers = Certificate.from_dict(json.loads(str(state[f"{name}.multipliers"])))
-    (before,) = _read_groups(state, f"{name}.before")
-    return PolytopeCertificate(
-        int(state[f"{name}.sample"]), before, read_arrays(HPolytope, f"{name}.rows", state), multipliers
-    )
-
-
-def _write_certificate(name: str, certificate: AnyCertificate | None) -> State:
-    if certificate is None:
-        return {}
-    published = isinstance(certificate, PublishedCertificate)
-    proofs = certificate.stacks if isinstance(certificate, PublishedCertificate) else (certificate,)
-    state: State = {name: np.array([published, certificate.sample, len(proofs)], dtype=np.int64)}
-    for i, proof in enumerate(proofs):
-        state |= _write_proof(f"{name}.{i}", proof)
-    return state
-
-
-def _read_certificate(state: Mapping[str, NDArray], name: str) -> AnyCertificate | None:
-    if name not in state:
-        return None
-    published, sample, count = (int(v) for v in state[name])
-    proofs = tuple(_read_proof(state, f"{name}.{i}") for i in range(count))
-    return PublishedCertificate(sample, proofs) if published else proofs[0]

@@ -20,7 +20,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx, fmpq
 from numpy.typing import NDArray
 
-from polytopes.exact import ZERO, rational
+from polytopes.exact import ZERO, ball_matrix, rational
 from svo.checks import Array
 from svo.models import Exponents, power
 from svo.observers.window.evidence import WindowEvidence, WindowSample
@@ -110,15 +110,15 @@ class _Reach:
     def move(self, s: WindowSample, of: Factors, rest: list[fmpq]) -> None:
         """To the next sample."""
         n, nu = self._n, s.u.size
-        states = _matrix(s.stack[0, :n, :n])
+        states = ball_matrix(s.stack[0, :n, :n])
         w = [_ball(low, high) for low, high in zip(s.w_lower, s.w_upper, strict=True)]
         p = [
             _ball(min(ends), max(ends))
             for (lo, hi), low, high in zip(self._delta, s.s_lower, s.s_upper, strict=True)
             for ends in [[rational(d) * rational(v) for d in (lo, hi) for v in (low, high)]]
         ]
-        columns = _matrix(np.hstack([s.stack[0, :n, n + nu + 1 :], of.gains[:, :n].T]))
-        known = _matrix(s.stack[0, :n, n : n + nu + 1])
+        columns = ball_matrix(np.hstack([s.stack[0, :n, n + nu + 1 :], of.gains[:, :n].T]))
+        known = ball_matrix(s.stack[0, :n, n : n + nu + 1])
         inputs = arb_mat(nu + 1, 1, [*(arb(float(v)) for v in s.u), arb(1)])
         self._centre = states * self._centre + known * inputs
         parts = [states * self._generators]
@@ -139,11 +139,6 @@ def _ball(lower: float | fmpq, upper: float | fmpq) -> tuple[arb, arb]:
     """Centre and half-width of an interval."""
     low, high = (arb(v) if isinstance(v, fmpq) else arb(float(v)) for v in (lower, upper))
     return (low + high) / 2, (high - low) / 2
-
-
-def _matrix(array: Array) -> arb_mat:
-    rows, columns = array.shape
-    return arb_mat(rows, columns, [arb(float(v)) for v in array.ravel()])
 
 
 def _diagonal(values: list[arb]) -> arb_mat:

@@ -14,6 +14,7 @@ from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
 from svo.models import NormalForm, UncertainModel
+from svo.models.state_range import within
 from svo.observers import window_kernel as kernel
 from svo.observers.answers import VerdictName
 from svo.observers.base import Observer
@@ -378,9 +379,7 @@ class WindowObserver(Observer):
         if found is None:
             return None
         samples, lower, upper = found
-        physical = self._normal.physical_range
-        if physical is not None:
-            lower, upper, _ = physical.cut(lower, upper)
+        lower, upper = within(self._normal.physical_range, lower, upper)
         window = self._new_window(ArrivalSet.box(lower, upper), self._number - len(samples) + 1, free=True)
         try:
             verdict = _repeated(samples, window)

@@ -35,8 +35,7 @@ class WindowStep(Step):
 
     @property
     def n(self) -> int:
-        n: int = self.observer.model.n_states
-        return n
+        return int(self.observer.model.n_states)
 
     def _box(self) -> tuple[Array, Array]:
         lower, upper = self.observer.bounds_at(self.sample)

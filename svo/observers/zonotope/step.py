@@ -8,6 +8,7 @@ import numpy as np
 
 from svo.checks import Array
 from svo.models import NormalForm
+from svo.models.state_range import within
 from svo.observers.answers import Step
 from svo.observers.given_units import zonotope_out
 from svo.observers.zonotope.program import ZonotopeProgram
@@ -44,11 +45,7 @@ class ZonotopeStep(Step):
         if not self._bounds:
             axes = np.eye(self.n)
             ends = self._outer(np.vstack([axes, -axes]))
-            lower, upper = -ends[self.n :], ends[: self.n]
-            physical = self._form.given.physical_range
-            if physical is not None:
-                lower, upper, _ = physical.cut(lower, upper)
-            self._bounds.append((lower, upper))
+            self._bounds.append(within(self._form.given.physical_range, -ends[self.n :], ends[: self.n]))
         lower, upper = self._bounds[0]
         return lower.copy(), upper.copy()
 

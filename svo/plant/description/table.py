@@ -63,20 +63,12 @@ class Table:
         return DescriptionError(f"{', '.join(place)}: {message}")
 
     @contextmanager
-    def errors(self) -> Iterator[None]:
-        """Give errors of what is made from this table its place."""
+    def errors(self, key: str | None = None) -> Iterator[None]:
+        """Give errors of what is made from this table, or from one key of it, their place."""
         try:
             yield
         except DescriptionError:
             raise
-        except (ValueError, TypeError) as error:
-            raise self.error(None, str(error)) from error
-
-    @contextmanager
-    def _errors_of(self, key: str) -> Iterator[None]:
-        """The same, of what is made from one key."""
-        try:
-            yield
         except (ValueError, TypeError) as error:
             raise self.error(key, str(error)) from error
 
@@ -96,7 +88,7 @@ class Table:
         value = self._value(key, None, default)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"is {shown(value)}; expected a number")
-        with self._errors_of(key):
+        with self.errors(key):
             return real_number(key, value, finite=False)
 
     def file_beside(self, key: str, name: str) -> Path:
@@ -112,7 +104,7 @@ class Table:
         if not isinstance(value, list) or _has_other_than_numbers(value) or not _has_rows_of_one_length(value):
             wanted = "[1, 2], or [[1, 2], [3, 4]] for a matrix with rows of one length"
             raise self.error(key, f"is {shown(value)}; expected numbers in brackets such as {wanted}")
-        with self._errors_of(key):
+        with self.errors(key):
             return real_array(key, value, finite=False)
 
     def table(self, key: str, known: Sequence[str] | None = None) -> Table:
