@@ -22,7 +22,7 @@ _HIGH_PRICE = 1e3
 _EXACT = 2.0**-10  # unit of readings without noise: the solver keeps to them a thousand times more closely
 # Of the sequential program: saving and cost that count as none, share of the Deltas' ranges that is worth a step.
 _WORTH_A_STEP, _NOTHING, _SHORTEST, _MOST_STEPS = 1e-2, 1e-9, 1e-2, 30
-_LARGEST = 1e18  # relative to the noise: HiGHS takes 1e20 for infinity
+_LARGEST = 1e18  # relative to the noise, or of an input in normal form: HiGHS takes 1e20 for infinity
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class ElasticProgram:
     def _sample(self, elastic: _Elastic, k: int, x: Columns, one: Columns, how: _Treatment) -> _Sample:
         model, program, of = self._model, elastic.program, self._samples[k]
         lower, upper, noise = model.bounds(self._log.schedule_at(self._first + k))
-        now = self._form.inputs(self._log.u[self._first + k])
+        now = self._inputs(self._first + k)
         u, w = program.columns(now, now), self._disturbances(elastic, lower, upper)
         known = np.concatenate([x, u, one, w])
         ranges = np.array([q.bounds for q in model.uncertainties]).reshape(-1, 2)
@@ -161,6 +161,16 @@ class ElasticProgram:
         sample = _Sample(x, w, known, stack, of, ranges, held, moved, d, on_d.T, p)
         self._measure(elastic, k, sample, noise)
         return sample
+
+    def _inputs(self, sample: int) -> Array:
+        given = self._log.u[sample]
+        now = self._form.inputs(given)
+        for j in np.flatnonzero(np.abs(now) > _LARGEST):
+            raise ValueError(
+                f"u of the log has the value {given[j]:g} of input {j} at sample {sample}, over {_LARGEST:g} times its "
+                "unit in the model's normal form; no program can hold that: correct it, or leave these samples out"
+            )
+        return now
 
     def _measure(self, elastic: _Elastic, k: int, sample: _Sample, noise: Array) -> None:
         read, n = self._log.y[self._first + k], self._model.n_states

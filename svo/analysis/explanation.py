@@ -92,11 +92,15 @@ def _bounds_along(model: UncertainModel, log: Log) -> tuple[Array, Array, Array]
 
 
 def _give(amounts: Array, chosen: Sequence[Bound], kind: str, lower: Array, upper: Array, values: Array) -> None:
-    """Enter what the values (K, m) need beyond their bounds, so much that sums in floats suffice as well."""
+    """Enter what the values (K, m) need beyond their bounds, so much that sums in floats suffice as well.
+
+    Bounds that are NaN, of readings that are missing, ask for nothing.
+    """
     if not values.size:
         return
     beyond = np.fmax.reduce(np.maximum(values - upper, lower - values), axis=0, initial=0.0)
-    room = 8 * _EPS * np.max(np.abs(lower) + np.abs(upper) + beyond, axis=0 if lower.ndim > 1 else None)
+    sizes = np.abs(lower) + np.abs(upper) + beyond
+    room = 8 * _EPS * np.fmax.reduce(sizes, axis=0 if lower.ndim > 1 else None)
     for i, bound in enumerate(chosen):
         if bound.kind == kind and beyond[bound.index] > 0.0:
             amounts[i] = beyond[bound.index] + np.broadcast_to(room, beyond.shape)[bound.index]

@@ -17,6 +17,7 @@ Columns = NDArray[np.int64]
 Terms = Sequence[tuple[Columns, Array]]
 
 FEASIBILITY = 1e-9  # HiGHS, absolute, of a row and of a reduced cost
+_STEPS = {"ipm_iteration_limit": 1_000, "simplex_iteration_limit": 1_000_000}  # far more than any that ended
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class SparseProgram:
         matrix, status = self._matrix(), ""
         for method, presolve in ((solver, "on"), ("simplex", "off")):  # thin programs leave one of them undecided
             options = {"threads": 1, "small_matrix_value": 1e-12, "solver": method, "presolve": presolve}
-            options |= {f"{side}_feasibility_tolerance": FEASIBILITY for side in ("primal", "dual")}
+            options |= _STEPS | {f"{side}_feasibility_tolerance": FEASIBILITY for side in ("primal", "dual")}
             program = HighsProgram(matrix, row_upper, row_lower=row_lower, lower=lower, upper=upper, options=options)
             found = program.minimise(cost)
             status = found.status

@@ -253,6 +253,29 @@ def test_missing_sensors_and_scheduled_bounds() -> None:
     assert calibrate(plant, disturbed(log, 31, 1, np.nan), START).widenings == ()
 
 
+@pytest.mark.parametrize("missing", [[0], [3, 4, 5], [29], list(range(1, 29))])
+def test_missing_readings_ask_for_nothing_of_a_noise_that_must_widen(missing: list[int]) -> None:
+    """With a single gap the noise became NaN: "could not be held in floats"."""
+    log = healthy(model(), 30)
+    beyond = next(k for k in (15, 0) if k not in missing)
+    y = disturbed(log, beyond, 1, 3.0).y
+    y[missing] = np.nan
+    log = replace(log, y=y)
+    found = calibrate(model(), log, START)
+    assert [(w.bound, w.sample) for w in found.widenings][:1] == [("noise flow", beyond)]
+    assert np.isfinite([w.amount for w in found.widenings]).all()
+    assert is_explained(found.model, log)
+
+
+@pytest.mark.parametrize("value", [1e20, 1e30, 1e300])
+def test_an_input_that_no_program_can_hold_is_named(value: float) -> None:
+    """1e30 is an infinite bound to HiGHS, and its interior-point method never ended."""
+    log = healthy(model())
+    log.u[7, 0] = value
+    with pytest.raises(ValueError, match=r"u of the log has the value \S+ of input 0 at sample 7"):
+        calibrate(model(), log, START)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
