@@ -34,6 +34,8 @@ from svo.observers.saved_state import State, check_model, check_unchanged, last_
 
 __all__ = ["Certificate", "Observer", "Record", "Step", "VerdictName"]
 
+_UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, RecursionError)  # by arrays that fit no observer
+
 
 class Observer(ABC):
     """The set of states that a model and the data so far allow, sample by sample.
@@ -294,7 +296,7 @@ class Observer(ABC):
             observer._set_up(model, state)
             check_model(state, model, observer.options)
             alarm = observer._resume(state)
-        except (KeyError, IndexError, TypeError, ValueError) as error:
+        except _UNREADABLE as error:
             raise ValueError(f"state does not belong to a {cls.kind} observer of this model: {error}") from error
         observer._schedule = last_schedule(state)
         observer._alarm = None if alarm is None else replace(alarm, sample=observer._number)

@@ -10,13 +10,13 @@ from collections import deque
 from collections.abc import Mapping
 from copy import copy
 from itertools import dropwhile
-from typing import Any
 
 import numpy as np
 
 from svo.checks import Array
 from svo.models import UncertainModel
 from svo.observers.free_start import Reading, state_bounds
+from svo.observers.saved_state import numbers, sample_shapes
 from svo.observers.window_kernel import LARGEST
 
 OUTGROWN = "outgrown"
@@ -41,7 +41,7 @@ class Readings:
     """
 
     def __init__(self, model: UncertainModel, eps: float, horizon: int = 0) -> None:
-        self._n, self._eps = model.n_states, eps
+        self._n, self._eps, self._shapes = model.n_states, eps, sample_shapes(model)
         self._delta = np.array([u.bounds for u in model.uncertainties]).reshape(-1, 2)
         self.samples: deque[Reading] = deque(maxlen=max(horizon, model.n_states + _EXTRA) + 1)
 
@@ -88,9 +88,15 @@ class Readings:
         return {f"{_PREFIX}{name}": np.array([getattr(s, name) for s in self.samples]) for name in names}
 
     def restore(self, state: Mapping[str, Array]) -> None:
-        """Take back what `state` gave."""
-        columns: list[Any] = [state.get(f"{_PREFIX}{name}", ()) for name in Reading._fields]
-        self.samples.extend(Reading(*(np.array(v) for v in values)) for values in zip(*columns, strict=True))
+        """Take back what `state` gave; ValueError unless it is that of samples of this model."""
+        if f"{_PREFIX}y" not in state:
+            return
+        count = len(state[f"{_PREFIX}y"])
+        columns = [
+            numbers(state, f"{_PREFIX}{name}", count, *self._shapes[name], missing=name == "y")
+            for name in Reading._fields
+        ]
+        self.samples.extend(Reading(*(v.copy() for v in values)) for values in zip(*columns, strict=True))
 
 
 def usable(reading: Reading) -> Reading:

@@ -146,3 +146,8 @@ class RecursiveObserver(Observer, Generic[Data]):
         if lost:
             self._readings = Readings(self._normal, self.eps, self._steps_kept)
             self._readings.restore(state)
+
+    def _check_started(self, has_set: bool) -> None:
+        """Raise ValueError if a state that was taken back is past its first sample and holds nothing of it."""
+        if self._number >= 0 and not has_set and self._readings is None:
+            raise ValueError(f"it is that of sample {self._number}, without the set of that sample")

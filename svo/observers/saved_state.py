@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
+from svo.checks import Array
 from svo.models import ModelSample, UncertainModel, model_digest
 from svo.models.digest import Options
 
@@ -72,6 +73,32 @@ def read_arrays(kind: type[Value], name: str, state: State) -> Value:
     """What `arrays_of` gave of a value of this type."""
     parts = _SET if kind is HPolytope else [f.name for f in fields(kind)]  # type: ignore[arg-type]
     return kind(*(np.array(state[f"{name}.{part}"]) for part in parts))
+
+
+def numbers(state: State, name: str, *shape: int | str, missing: bool = False, infinite: bool = False) -> Array:
+    """A copy of an array of floats: finite, or NaN where some may be missing; a name stands for any size.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If there is none of this shape.
+    """
+    value = np.asarray(state[name])
+    if value.dtype != np.float64 or value.ndim != len(shape):
+        raise ValueError(f"{name} is {value.dtype} {value.shape}; expected float64 {shape}")
+    if any(isinstance(wanted, int) and wanted != size for wanted, size in zip(shape, value.shape, strict=True)):
+        raise ValueError(f"{name} has shape {value.shape}; expected {shape}")
+    if not (np.isfinite(value) | (np.isnan(value) & missing) | (np.isinf(value) & infinite)).all():
+        raise ValueError(f"{name} has an entry that is no number")
+    return value.copy()
+
+
+def sample_shapes(model: UncertainModel) -> dict[str, tuple[int, ...]]:
+    """Shapes of the data of one sample, by their names in saved states."""
+    n, nu, ny, nw = model.n_states, model.n_inputs, model.n_outputs, model.n_disturbances
+    stack = (1 + len(model.uncertainties), n + ny, n + nu + 1 + nw)
+    outputs = dict.fromkeys(("y", "noise", "slack"), (ny,))
+    return {"stack": stack, "u": (nu,), **outputs, "w_lower": (nw,), "w_upper": (nw,), "w_box": (2, nw)}
 
 
 def take_exactly(target: Mapping[str, NDArray[Any]], state: State) -> None:

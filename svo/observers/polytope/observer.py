@@ -185,11 +185,10 @@ class PolytopeObserver(RecursiveObserver[Sample]):
         number, largest, lost = (int(v) for v in state["restart"])
         self._number, self.largest_at = number, None if largest == NO_SAMPLE else largest
         self._restore_readings(lost, state)
+        self._check_started("sample.stack" in state)
         if "sample.stack" not in state:
             return None
-        sample, outcome = read_sample(state, "sample"), read_outcome(state, "outcome")
-        if sample.stack.shape != self.model.stack(self.model.schedule).shape:
-            raise ValueError(f"its stack has shape {sample.stack.shape}")
+        sample, outcome = read_sample(state, "sample", self.model), read_outcome(state, "outcome", self.model)
         self._last = sample, outcome
         return self._answer(outcome) if outcome.verdict == "falsified" else None
 

@@ -135,11 +135,18 @@ class Memory:
             self.arrays[name][tuple(slice(0, length) for length in small.shape)] = small
 
     def check_clock(self) -> None:
-        """Raise ValueError unless the clock is one."""
+        """Raise ValueError unless the clock is one, and whatever else the kernel takes for an index is one too."""
         clock, base, time, steps = self.arrays["clock"], self.base, self.time, self.size.N
         flags = clock[[kernel.STARTED, kernel.PENDING]]
         if not (0 <= base <= time <= base + steps and np.isin(flags, (0, 1)).all() and (clock >= 0).all()):
             raise ValueError(f"its window holds samples {base} to {time}; expected at most {steps} steps from 0 on")
+        ends = {"k": self.size.K - 1, "rows": len(self.arrays["G"]), "cols": len(self.arrays["GT"]), "status": 4}
+        for name, end in (ends | {"owner": self.size.ni}).items():
+            if ((self.arrays[name] < 0) | (self.arrays[name] >= end)).any():
+                raise ValueError(f"{name} has an entry below 0 or above {end - 1}")
+        for name in ("stack", "u", "noise", "slack", "w_lower", "w_upper", "h_lower", "h_upper"):
+            if np.isnan(self.arrays[name]).any():
+                raise ValueError(f"{name} contains NaN")
 
 
 def _room_for(size: kernel.Sizes) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
-from svo.observers.saved_state import arrays_of, read_arrays
+from svo.observers.saved_state import arrays_of, numbers
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.memory import WindowSettings
 from svo.observers.window.sample import Outgrown, Sample, check_matrices
@@ -240,11 +240,12 @@ class WindowObserver(Observer):
     def _set_up(self, model: UncertainModel, state: Mapping[str, NDArray[Any]]) -> None:
         horizon, _, eps, cells = (float(v) for v in state["settings"])
         form, steps = NormalForm.from_state_dict(model, state), None if horizon < 0 else int(horizon)
-        self._configure(WindowSettings(form, steps, state["template"], eps, int(cells)))
+        template = numbers(state, "template", "r", model.n_states)
+        self._configure(WindowSettings(form, steps, template, eps, int(cells)))
 
     def _resume(self, state: Mapping[str, NDArray[Any]]) -> WindowStep | None:
         origin, free, lost, lost_at, largest, has_readings = (int(v) for v in state["restart"])
-        self._initial, anchor = (read_arrays(ArrivalSet, name, state) for name in ("initial", "anchor"))
+        self._initial, anchor = (self._read_arrival(state, name) for name in ("initial", "anchor"))
         falsified = bool(state["falsified"])
         self._window = Window(self._settings, anchor, int(state["settings"][1]), origin, bool(free))
         self._window.resume(state, falsified)
@@ -255,7 +256,16 @@ class WindowObserver(Observer):
         if has_readings:
             self._readings = self._new_readings()
             self._readings.restore(state)
+        elif lost:
+            raise ValueError("it has lost its set, and holds no readings to find one again")
         return self._said("falsified") if falsified else None
+
+    def _read_arrival(self, state: Mapping[str, NDArray[Any]], name: str) -> ArrivalSet:
+        """An arrival set from its arrays; ValueError unless they fit together."""
+        n, ends = self.model.n_states, len(state[f"{name}.rows"])
+        sizes = {"box_lower": n, "box_upper": n, "lower": ends, "upper": ends}
+        bounds = {part: numbers(state, f"{name}.{part}", size, infinite=True) for part, size in sizes.items()}
+        return ArrivalSet(rows=numbers(state, f"{name}.rows", ends, n), **bounds)
 
     # -- inside ----------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.readings import NO_SAMPLE, OUTGROWN
 from svo.observers.recursion import RecursiveObserver
-from svo.observers.saved_state import arrays_of, read_arrays
+from svo.observers.saved_state import arrays_of, numbers, sample_shapes
 from svo.observers.window.evidence import WindowSample
 from svo.observers.window.setup import arrival_of, needs_next_input
 from svo.observers.window_kernel import LARGEST
@@ -140,29 +140,41 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
 
     def _resume(self, state: Mapping[str, NDArray[Any]]) -> ZonotopeStep | None:
         """The stages are made again from their arrival sets and data, as they were made first."""
-        self._begin_from(read_arrays(ConstrainedZonotope, "first", state))
+        self._begin_from(self._read_set(state, "first"))
         number, falsified, *_ = (float(v) for v in state["settings"])
         largest, lost = (int(v) for v in state["restart"])
         self._number, self.largest_at = int(number), None if largest == NO_SAMPLE else largest
-        stages: list[Stage] = []
+        stages, shapes = list[Stage](), sample_shapes(self.model)
         while f"{len(stages)}.stack" in state:
             i = len(stages)
-            values = {name: np.array(state[f"{i}.{name}"]) for name in _SAMPLE}
+            values = {part: numbers(state, f"{i}.{part}", *shapes[part], missing=part == "y") for part in _SAMPLE}
             bounds = values["w_lower"], values["w_upper"], values["noise"]
             data = self._builder.data(values["stack"], bounds, values["u"], values["y"])
-            arrival = read_arrays(ConstrainedZonotope, f"{i}.arrival", state)
+            arrival = self._read_set(state, f"{i}.arrival")
             if i:
                 before, arrival = self._builder.predicted(stages[-1], stages[-1].data.u)
                 stages[-1] = before
             stages.append(self._builder.measured(arrival, data))
         self._stages = tuple(stages)
         self._restore_readings(lost, state)
+        self._check_started(bool(stages))
         if not falsified:
             return None
         verdict, certificate = self._decide(self._stages[:-1], self._stages[-1])
         if verdict != "falsified":
             raise ValueError("its falsification cannot be proven again")
         return self._answer(verdict, self._stages[-1], certificate)
+
+    def _read_set(self, state: Mapping[str, NDArray[Any]], name: str) -> ConstrainedZonotope:
+        """One of the state, from its arrays; ValueError unless they fit together."""
+        n, generators = self.model.n_states, np.shape(state[f"{name}.generators"])[-1]
+        rows = len(state[f"{name}.offset"])
+        shapes = {"center": (n,), "generators": (n, generators), "room": (n,)}
+        shapes |= {"constraints": (rows, generators), "offset": (rows,), "slack": (rows,)}
+        P = ConstrainedZonotope(**{part: numbers(state, f"{name}.{part}", *shape) for part, shape in shapes.items()})
+        if (P.room < 0.0).any() or (P.slack < 0.0).any():
+            raise ValueError(f"{name} has room or slack below zero")
+        return P
 
     # -- the recursion -----------------------------------------------------------------------------
 

@@ -189,3 +189,57 @@ def test_a_claimed_falsification_is_not_believed(kind: Any) -> None:
         forged = edited("outcome.verdict", lambda _: np.array(1))(state)
     with pytest.raises(ValueError, match="cannot be proven again"):
         kind.from_state_dict(model(), resealed(forged))
+
+
+MADE = {
+    "longer": lambda v: np.concatenate([v, v[:1]]),
+    "single": lambda v: v.astype(np.float32),
+    "text": lambda v: np.full(v.shape, "x"),
+    "NaN": lambda v: np.where(np.arange(v.size).reshape(v.shape) == 0, np.nan, v),
+}
+NUMBERS = ("stack", "u", "noise", "slack", "w_lower", "w_upper", "h_lower", "h_upper", "initial", "anchor", "template")
+
+
+@pytest.mark.parametrize("made", MADE)
+@pytest.mark.parametrize("lost", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_array_that_fits_no_sample_of_the_model_is_refused(kind: Any, lost: bool, made: str) -> None:
+    """NaN came out of boxes, and what does not fit raised numpy's errors at the next sample."""
+    observer = driven(kind(model(), START))
+    if lost:
+        observer.lose_set()
+        observer.step(u=[0.0], y=[0.0], u_next=[0.0])
+    state = observer.state_dict()
+    for name, value in state.items():
+        own = name.partition(".")[0] in NUMBERS or kind is not WindowObserver or made == "longer"
+        if value.dtype != np.float64 or not value.size or value.ndim == 0 or name.startswith("w_old") or not own:
+            continue
+        try:
+            again = kind.from_state_dict(model(), resealed(state | {name: MADE[made](value)}))
+        except ValueError:
+            continue
+        assert made != "text", name
+        for _ in range(3):
+            step = again.step(u=[0.0], y=[0.0], u_next=[0.0])
+            assert step.verdict == "falsified" or not np.isnan(step.box).any(), name
+
+
+@pytest.mark.parametrize("name", ["k", "rows", "cols", "status", "owner"])
+@pytest.mark.parametrize("value", [-1, 10**6, 2**62])
+def test_a_basis_that_points_outside_of_the_window_is_refused(name: str, value: int) -> None:
+    """The kernel followed it: a segmentation fault."""
+    state = driven(WindowObserver(model(), START)).state_dict()
+    state[name].flat[0] = value
+    with pytest.raises(ValueError, match=f"{name} has an entry"):
+        WindowObserver.from_state_dict(model(), resealed(state))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_state_without_its_newest_set_is_refused(kind: Any) -> None:
+    state = driven(kind(model(), START)).state_dict()
+    if kind is WindowObserver:
+        state["restart"][2] = 1
+    else:
+        state = {name: value for name, value in state.items() if not name.startswith(("0.", "sample.", "outcome."))}
+    with pytest.raises(ValueError, match="state does not belong to"):
+        kind.from_state_dict(model(), resealed(state))
