@@ -37,7 +37,7 @@ class MeasuredOutput:
         None where an uncertainty enters the output: its rows rest on bounds of s that were computed in floats.
         """
         ny = self.y.size
-        if self.stack.ndim != 3 or self.noise.shape != (ny,) or self.u.ndim != 1 or len(rows.C):
+        if self.stack.ndim != 3 or not self.y.shape == self.noise.shape == (ny,) or self.u.ndim != 1 or len(rows.C):
             return False
         if not all(np.isfinite(v).all() for v in (self.stack, self.u, self.noise, rows.b)) or np.isinf(self.y).any():
             return False

@@ -82,6 +82,8 @@ def test_rows_tighter_than_the_measurement_prove_nothing() -> None:
         (lambda r: r["certificate"].update(before=[]), ""),
         (lambda r: r["certificate"]["data"].update(y={"shape": [0], "hex": ""}), "the proof does not hold"),
         (lambda r: r["certificate"]["data"].update(y={"shape": [1], "hex": "inf"}), "the proof does not hold"),
+        (lambda r: r["certificate"]["data"]["y"].update(shape=[1, 1]), "the proof does not hold"),
+        (lambda r: r["certificate"]["data"]["y"].update(shape=[]), "the proof does not hold"),
         (lambda r: r["certificate"]["measurement"]["b"].update(hex="nan nan"), "incomplete alarm record"),
         (lambda r: r.update(kind="rumour"), "no certificate of a known kind; known are window, "),
         (lambda r: r.update(kind="window"), "incomplete alarm record"),
