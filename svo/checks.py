@@ -58,9 +58,8 @@ def chosen(name: str, value: str, choices: Mapping[str, Item]) -> Item:
 
 def sizes(name: str, value: Any, count: int) -> Array:
     """So many finite numbers >= 0, such as half-widths."""
-    array = np.array(value, dtype=float)
-    fits = array.shape == (count,) and np.isfinite(array).all() and (array >= 0).all()
-    expect(fits, name, array, f"{count} finite numbers >= 0")
+    array = real_array(name, value, (count,))
+    expect((array >= 0).all(), name, array, f"{count} finite numbers >= 0")
     return array
 
 

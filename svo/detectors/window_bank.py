@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
-from svo.checks import Array
+from svo.checks import Array, real_array
 from svo.detectors.detector import NOBODY, Detection, Kind, Parameter, Setting
 from svo.detectors.scaled_bounds import scaled_bounds
 from svo.isolation import ArchitectureI
@@ -141,7 +141,7 @@ class WindowBank:
 
     def _measure(self, width: Array | None, k: int, step: Any) -> None:
         if width is not None:
-            directions = np.atleast_2d(np.asarray(self.width_of, dtype=float))
+            directions = np.atleast_2d(real_array("width_of", self.width_of))
             width[k] = step.support(np.concatenate([directions, -directions])).reshape(2, -1).sum(axis=0)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from svo.checks import Array, expect
+from svo.checks import Array, expect, real_array
 
 _EPS = float(np.finfo(np.float64).eps)
 
@@ -58,7 +58,7 @@ def state_range(name: str, value: Any, n: int, bounded: bool) -> StateRange | No
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         Naming the argument, what it is and what was expected.
     """
     if value is None:
@@ -66,11 +66,8 @@ def state_range(name: str, value: Any, n: int, bounded: bool) -> StateRange | No
     wanted = f"(lower, upper), each a number or of shape ({n},), lower <= upper"
     wanted += ", all finite" if bounded else "; -inf or inf where there is no bound"
     expect(isinstance(value, tuple | list) and len(value) == 2, name, value, wanted)
-    try:
-        ends = [np.broadcast_to(np.array(end, dtype=float), (n,)).copy() for end in value]
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} is {value!r}; expected {wanted}") from error
-    lower, upper = ends
+    given = (real_array(f"{name}[{i}]", end, (), (n,), meaning=wanted, finite=False) for i, end in enumerate(value))
+    ends = lower, upper = [np.full(n, end) for end in given]
     if not ((lower <= upper) & (lower < np.inf) & (upper > -np.inf)).all():
         raise ValueError(f"{name} is between {lower} and {upper}; expected {wanted}")
     found = StateRange(lower, upper)

@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from svo.checks import real_array
 from svo.logs.log import Log
 
 
@@ -32,7 +33,7 @@ def schedule_of(scheduler: Scheduler, y: NDArray[np.float64], u: NDArray[np.floa
 def scheduled(scheduler: Scheduler, log: Log) -> Log:
     """A ``log`` with the schedule that a fresh ``scheduler`` makes of its y and u."""
     values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
-    return replace(log, schedule=None if values[0] is None else np.array(values, dtype=float))
+    return replace(log, schedule=None if values[0] is None else real_array("schedule", values, finite=False))
 
 
 @runtime_checkable
