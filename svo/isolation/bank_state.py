@@ -44,9 +44,7 @@ class Sample:
         """Those that are given, by name."""
         given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule")}
         try:
-            return {
-                name: real_array(name, v, finite=False, missing=True) for name, v in given.items() if v is not None
-            }
+            return {name: real_array(name, v, finite=False, missing=True) for name, v in given.items() if v is not None}
         except (TypeError, ValueError) as error:
             raise TypeError(f"schedule is {self.schedule!r}; only numbers and arrays of them can be saved") from error
 

@@ -127,12 +127,12 @@ TWO_EXACT_SENSORS = _system(
 )
 
 
-def _rich(name: str, **changes: Any) -> System:
+def _rich(name: str, first: Any = ((-1.0, 1.0), (-1.0, 1.0)), **changes: Any) -> System:
     given: dict[str, Any] = {
         "A": [[1.0, 0.1], [0.0, 0.95]], "B": [[0.005], [0.1]], "C": [[1.0, 0.0]],
         "E": [[0.005], [0.1]], "w": [0.2], "n": [0.05], "Ts": 0.1,
     }  # fmt: skip
-    return System(name, UncertainModel(**given | changes), ((-1.0, 1.0), (-1.0, 1.0)))
+    return System(name, UncertainModel(**given | changes), first)
 
 
 RICH = (
@@ -143,5 +143,15 @@ RICH = (
     _rich("an uncertain output", uncertainties=[Uncertainty(C=[[0.05, 0.0]], bounds=(-1.0, 1.0))]),
     _rich("a schedule", A=lambda s: np.array([[1.0, 0.1], [0.0, 0.9 + 0.05 * s]]), schedule=0.0),
     _rich("the disturbance in the output", F=[[0.3]]),
+    _rich("a schedule of bounds and sensors", n=lambda s: [0.05 + 0.5 * s * s], C=lambda s: [[1.0, 0.5 * s]],
+          B=lambda s: [[0.0], [0.1 + 0.3 * s]], w=(lambda s: [-0.5 - s * s], lambda s: [0.5 + s * s]), schedule=0.0),
+    _rich("an uncertain constant", uncertainties=[Uncertainty(a=[0.0, 0.3]), Uncertainty(c=[0.3])]),
+    _rich("an uncertain disturbance gain", uncertainties=[Uncertainty(E=[[0.0], [1.0]])]),
+    _rich("an uncertain feedthrough", uncertainties=[Uncertainty(D=[[0.2]])]),
+    _rich("an uncertain disturbance in the output", w=[1.0], uncertainties=[Uncertainty(F=[[0.5]])]),
+    _rich("disturbances in a polytope", E=np.eye(2), w=HPolytope([[1, 1], [-1, 0], [0, -1]], [0.25, 0.125, 0.125])),
     _rich("several disturbances", E=np.eye(2), w=[0.02, 0.05], a=[0.01, 0.0], c=[0.2], D=[[0.1]]),
+    _rich("first states on a line", first=((0.5, 0.5), (-1.0, 1.0))),
+    _rich("three states", first=((-1.0, 1.0),) * 3, A=[[1.0, 0.1, 0.0], [0.0, 0.9, 0.1], [0.0, -0.1, 0.9]],
+          B=[[0.0], [0.0], [0.1]], C=[[1.0, 0.0, 0.0]], E=[[0.0], [0.0], [0.1]]),
 )  # fmt: skip

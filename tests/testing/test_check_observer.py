@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -149,3 +151,54 @@ def test_the_page_lists_every_rule() -> None:
 def test_what_cannot_be_called_makes_no_observer() -> None:
     with pytest.raises(TypeError, match="make is int; expected a class of observers, or a function"):
         check_observer(3)  # type: ignore[arg-type]
+
+
+def without(*blocks: str) -> Callable[[UncertainModel, HPolytope], WindowObserver]:
+    """An observer that leaves some blocks out of every uncertainty."""
+
+    def make(model: UncertainModel, initial: HPolytope) -> WindowObserver:
+        parts = [replace(item, **dict.fromkeys(blocks)) for item in model.uncertainties]
+        kept = [item for item in parts if any(getattr(item, name) is not None for name in "ABaECDcF")]
+        return WindowObserver(model.replace(uncertainties=kept), initial, horizon=3)
+
+    return make
+
+
+def inner_box_of_w(model: UncertainModel, initial: HPolytope) -> WindowObserver:
+    P = model.disturbance_polytope
+    if P is not None:
+        ball = P.chebyshev()
+        model = model.replace(w=HPolytope.box(ball.centre - ball.radius / 2, ball.centre + ball.radius / 2))
+    return WindowObserver(model, initial, horizon=3)
+
+
+def typical_bounds(model: UncertainModel, initial: HPolytope) -> WindowObserver:
+    lower, upper, noise = model.bounds(model.schedule)
+    return WindowObserver(model.replace(w=(lower, upper), n=noise), initial, horizon=3)
+
+
+def half_of_three(model: UncertainModel, initial: HPolytope) -> WindowObserver:
+    lower, upper = initial.bounding_box()
+    inner = HPolytope.box(lower / 2, upper / 2) if model.n_states > 2 else initial
+    return WindowObserver(model, inner, horizon=3)
+
+
+def divides_by_a_width(model: UncertainModel, initial: HPolytope) -> WindowObserver:
+    lower, upper = initial.bounding_box()
+    if (lower == upper).any():
+        raise ZeroDivisionError("float division by zero")
+    return WindowObserver(model, initial, horizon=3)
+
+
+LEFT_OUT = {f"uncertain {name}": without(name) for name in "ABaECDcF"} | {
+    "w in a polytope": inner_box_of_w,
+    "scheduled bounds": typical_bounds,
+    "three states": half_of_three,
+    "a flat first set": divides_by_a_width,
+}
+
+
+@pytest.mark.parametrize("what", LEFT_OUT)
+def test_no_part_of_a_model_can_be_left_out(what: str) -> None:
+    with pytest.raises(ConformanceError):
+        check_observer(LEFT_OUT[what])
