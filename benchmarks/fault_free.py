@@ -22,7 +22,6 @@ from rich.table import Table
 
 from svo.plant import HEALTHY, Plant, first_faulty_sample, load_plant
 from svo.studies.configuration import Job, StudyConfiguration
-from svo.studies.isolation.runner import warm_up
 
 PLANT = "eclipse"
 SEED = 734_190_006
@@ -133,11 +132,18 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
+def _compile(plant: Plant) -> None:
+    """Once, so that the processes find everything compiled."""
+    noise = plant.noise_sets[0]
+    plant.simulate(HEALTHY, HEALTHY, noise, 0)
+    plant.bank(noise).warm_up()
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run, count and print; without arguments a short form of the full count."""
     options = _parse([] if arguments is None else arguments)
     plant = _plant()
-    warm_up(plant, plant.noise_sets[0])  # once, so that the processes find everything compiled
+    _compile(plant)
     todo = jobs(plant, options.runs, options.faulty_runs)
     begun = perf_counter()
     console = Console(width=150)

@@ -23,6 +23,7 @@ from polytopes.exact import (
     row_to_floats,
     to_floats,
 )
+from polytopes.integers import lowest_bit
 
 _EPS = float(np.finfo(np.float64).eps)
 _NO_BITS = 2**20  # exponent of the last bit of zero
@@ -194,10 +195,7 @@ def exact_sums(A: Floats, b: Floats, solution: Floats, reach: Floats) -> NDArray
 
 def _finest(values: Floats) -> NDArray[np.int64]:
     """Exponent of the last bit of each number, huge for zero."""
-    mantissas, powers = np.frexp(values)
-    bits = np.ldexp(mantissas, 53).astype(np.int64)
-    last = np.frexp((bits & -bits).astype(np.float64))[1] - 1
-    return np.where(values != 0.0, powers - 53 + last, _NO_BITS)
+    return np.where(values != 0.0, lowest_bit(values), _NO_BITS)
 
 
 def _pivot_order(C: Floats, first: list[int]) -> NDArray[np.int64]:

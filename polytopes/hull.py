@@ -48,11 +48,8 @@ def hull_normals(V: Floats) -> tuple[Floats, Floats]:
     across = _unit(_divided(axes[rank:], scale))
     if rank == 0:
         return np.empty((0, n)), across
-    found = _facets(offsets @ axes[:rank].T / sizes[:rank])
-    rows = found.rows[:, :-1]
-    if not found.certain():
-        rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(rank))]
-    return _unit(_divided(rows / sizes[:rank] @ axes[:rank], scale)), across
+    normals = _facets(offsets @ axes[:rank].T / sizes[:rank]).normals()
+    return _unit(_divided(normals / sizes[:rank] @ axes[:rank], scale)), across
 
 
 def nearly_flat(V: Floats, rays: Floats) -> Floats:
@@ -121,6 +118,13 @@ class _Facets:
     number: Indices
     corners: Indices
 
+    def normals(self) -> Floats:
+        """The rows' normals, without those that no facet has."""
+        normals, offsets = self.rows[:, :-1], self.rows[:, -1]
+        if self.certain():
+            return normals
+        return normals[irredundant(np.ascontiguousarray(normals.T), -offsets, np.zeros(normals.shape[1]))]
+
     def certain(self) -> bool:
         """Whether each row surely is a facet of its own.
 
@@ -176,11 +180,7 @@ def normals_by_supports(oracle: Oracle, inner: Floats) -> Floats:
         points: Floats = (oracle(directions @ axes) - inner) @ axes.T
         return points
 
-    found = _refined(scaled_oracle, n)
-    rows = found.rows[:, :-1]
-    if not found.certain():
-        rows = rows[irredundant(np.ascontiguousarray(rows.T), -found.rows[:, -1], np.zeros(n))]
-    return _unit(rows @ axes)
+    return _unit(_refined(scaled_oracle, n).normals() @ axes)
 
 
 def _refined(oracle: Oracle, n: int) -> _Facets:

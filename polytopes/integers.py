@@ -24,7 +24,7 @@ def integer_rows(table: Floats) -> Integers:
     """Each row (m, n) as primitive integers, up to a positive factor; machine integers where all of them fit."""
     if not table.size:
         return np.zeros(table.shape, dtype=np.int64)
-    lowest, highest = _lowest_bit(table).min(axis=1, initial=0), np.frexp(table)[1].max(axis=1, initial=0)
+    lowest, highest = lowest_bit(table).min(axis=1, initial=0), np.frexp(table)[1].max(axis=1, initial=0)
     if (lowest > -_FARTHEST).all() and (highest - lowest < _FARTHEST).all():
         whole = np.ldexp(table, -lowest[:, None])
         if np.abs(whole).max() < _WIDE:
@@ -38,13 +38,12 @@ def integer_rows(table: Floats) -> Integers:
     return primitive(rows)
 
 
-def _lowest_bit(table: Floats) -> NDArray[np.int64]:
-    """Exponent of the lowest bit of each entry; of a zero, a large one that never is the least."""
+def lowest_bit(table: Floats) -> NDArray[np.int64]:
+    """Exponent of the lowest bit of each entry; 0 for a zero."""
     parts, exponents = np.frexp(np.abs(table))
     whole = (parts * _EXACT).astype(np.int64)
     trailing = np.frexp((whole & -whole).astype(np.float64))[1] - 1
-    found: NDArray[np.int64] = np.where(whole == 0, 0, trailing + exponents.astype(np.int64) - 53)
-    return found
+    return np.where(whole == 0, 0, trailing + exponents.astype(np.int64) - _BITS)
 
 
 def short(rows: Integers) -> bool:
@@ -70,7 +69,7 @@ def exact_product(A: Floats, M: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """``A M`` and, for each entry, whether no rounding can have happened: all terms are multiples of one power of two
     and, together, below 2^53 of it.
     """
-    rows, columns = _lowest_bit(A).min(axis=1, initial=0), _lowest_bit(M).min(axis=0, initial=0)
+    rows, columns = lowest_bit(A).min(axis=1, initial=0), lowest_bit(M).min(axis=0, initial=0)
     with np.errstate(over="ignore"):
         limit = np.ldexp(_EXACT, rows[:, None] + columns[None])
     return A @ M, np.abs(A) @ np.abs(M) <= limit

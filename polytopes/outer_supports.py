@@ -1,16 +1,14 @@
-"""Upper bounds of the support function that no rounding undercuts.
+"""Upper bounds of the support function that no rounding undercuts, also of sets or directions known up to an error.
 
 For x in ``{A x <= b, C x = d}`` and multipliers y >= 0 and z, weak duality says ``c'x <= y'b + z'd + r'|x|`` with
 ``r = |c - A'y - C'z|``.  Multipliers of float programs leave an r of some rounding errors, so a bound of |x| makes it a
-bound of ``c'x``; along the axes it bounds |x| itself.  Where there is no such bound (the set is unbounded) or it is not
-sharp (the set is thin) the support is exact: from the generators in integers, or by the rational simplex.
+bound of ``c'x``; along the axes it bounds |x| itself.
 """
 
 from fractions import Fraction
 
 import numpy as np
 from flint import fmpq
-from numpy.typing import NDArray
 
 from polytopes.checks import Floats
 from polytopes.duality import equality_multipliers
@@ -23,7 +21,6 @@ from polytopes.rows import Rows
 from polytopes.support import maxima
 
 _EPS = float(np.finfo(np.float64).eps)
-_SHARP = 1e-7  # of the radius of a largest ball: rounding beyond, and the support is worth rational arithmetic
 _TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -44,13 +41,14 @@ def upper_supports(P: Rows, directions: Floats, uncertain: Floats | None = None)
     """
     if uncertain is None and P.exact is not None:
         return np.array([up(support_of(P.exact, row)) for row in directions])
-    bounds, sharp = _by_duality(P, directions, np.zeros_like(directions) if uncertain is None else uncertain)
-    for k in np.flatnonzero(~sharp):
-        value = None if uncertain is not None and uncertain[k].any() else _by_simplex(P, directions[k])
-        if value is None and not np.isfinite(bounds[k]):
-            raise UndecidedError(f"no bound of the support in direction {directions[k].tolist()} was proved.")
-        bounds[k] = bounds[k] if value is None else up(value)
-    return bounds
+    best = maxima(P, directions)
+    assert best is not None
+    if uncertain is None:
+        return best.values
+    most = reach(P)
+    if most is None:
+        raise UndecidedError("no bound of the points of the set was proved.")
+    return np.nextafter(best.values + (1.0 + (P.dim + 4) * _EPS) * (uncertain @ most), np.inf)
 
 
 def lower_supports(P: Rows, directions: Floats) -> Floats:
@@ -83,24 +81,6 @@ def reach(P: Rows, moved: Floats | None = None) -> Floats | None:
     axes = np.vstack([np.eye(P.dim), -np.eye(P.dim)])
     best = maxima(P, axes)
     return None if best is None else _proved_reach(best.values, *_duality(P, axes, best, moved))
-
-
-def _by_duality(P: Rows, directions: Floats, uncertain: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Bounds by the multipliers of float programs, and whether each is sharp; inf and False where there is none."""
-    n = P.dim
-    rows = np.vstack([np.eye(n), -np.eye(n), directions])
-    best = maxima(P, rows)
-    assert best is not None
-    constant, weights = _duality(P, rows, best, None)
-    most = _proved_reach(best.values[: 2 * n], constant[: 2 * n], weights[: 2 * n])
-    if most is None:
-        return np.full(len(directions), np.inf), np.zeros(len(directions), dtype=bool)
-    bounds = constant[2 * n :] + (weights[2 * n :] + uncertain) @ most
-    bounds += 4.0 * _EPS * np.abs(bounds)
-    forms = P.program.flat.restrict(directions, np.zeros(len(directions)))[0]
-    room = _SHARP * P.program.interior.radius * np.linalg.norm(np.ldexp(forms, P.program.powers), axis=1)
-    sharp = bounds - best.values[2 * n :] <= room + 2.0 * uncertain @ most
-    return bounds, sharp
 
 
 def _duality(P: Rows, rows: Floats, best: Maxima, moved: Floats | None) -> tuple[Floats, Floats]:

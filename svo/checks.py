@@ -19,7 +19,9 @@ __all__ = [
     "check_noise",
     "chosen",
     "expect",
+    "expect_kind",
     "expect_one_of",
+    "expect_shape",
     "finite_array",
     "floats",
     "is_count",
@@ -48,6 +50,18 @@ def expect(holds: object, name: str, value: Any, what: str) -> None:
 def expect_one_of(name: str, value: Any, choices: Collection[str]) -> None:
     """Refuse what is none of some words."""
     expect(value in choices, name, value, f"one of {', '.join(choices)}")
+
+
+def expect_kind(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> None:
+    """Refuse what is of another type; ``what`` was expected instead."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} is a {type(value).__name__}; expected {what}")
+
+
+def expect_shape(fits: object, name: str, array: NDArray[Any], what: str) -> None:
+    """Refuse an array whose shape does not fit; ``what`` was expected instead."""
+    if not fits:
+        raise ValueError(f"{name} has shape {array.shape}; expected {what}")
 
 
 def chosen(name: str, value: str, choices: Mapping[str, Item]) -> Item:
@@ -121,16 +135,13 @@ def check_disturbance_box(lower: Array, upper: Array, nw: int) -> None:
 
 def check_noise(noise: Array, ny: int) -> None:
     """Half-widths (ny,), finite and not negative."""
-    if noise.shape != (ny,):
-        raise ValueError(f"n has shape {noise.shape}; expected ({ny},), one half-width a sensor")
-    if not np.isfinite(noise).all() or (noise < 0).any():
-        raise ValueError(f"n is {noise}; expected finite half-widths >= 0")
+    expect_shape(noise.shape == (ny,), "n", noise, f"({ny},), one half-width a sensor")
+    expect(np.isfinite(noise).all() and (noise >= 0).all(), "n", noise, "finite half-widths >= 0")
 
 
 def bounded_box(name: str, P: HPolytope, dimension: int) -> tuple[Array, Array]:
     """Bounds of a set that must have a point and be bounded."""
-    if not isinstance(P, HPolytope):
-        raise TypeError(f"{name} is {type(P).__name__}; expected an HPolytope, such as HPolytope.box(lower, upper)")
+    expect_kind(name, P, HPolytope, "an HPolytope, such as HPolytope.box(lower, upper)")
     if P.dim != dimension:
         raise ValueError(f"{name} has dimension {P.dim}; expected {dimension}")
     if P.emptiness().status != "nonempty":

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, real_array
+from svo.checks import Array, expect_shape, real_array
 
 __all__ = ["DetectionIndices", "FirstAlarm", "detection_indices", "first_true", "isolation_indices", "judge_alarm"]
 
@@ -187,8 +187,7 @@ def _share(durations: Array, true: NDArray[np.bool_]) -> float:
 
 def _checked(time: ArrayLike, decision: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     times, alarm = real_array("time", time, finite=False, missing=True), _flags(decision)
-    if times.ndim != 1 or times.size < 2:
-        raise ValueError(f"time has shape {times.shape}; expected (K,) with at least two samples")
+    expect_shape(times.ndim == 1 and times.size >= 2, "time", times, "(K,) with at least two samples")
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise ValueError("time is not strictly increasing; expected finite, increasing seconds")
     if alarm.shape != times.shape or alarm.dtype != np.bool_:

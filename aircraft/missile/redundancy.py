@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aircraft.missile.airframe import INPUT_LOWER, INPUT_UPPER, INPUTS, Airframe
 from aircraft.missile.simulator import ACCELERATION, VELOCITY, dynamic_pressure, force_coefficients
-from svo.checks import Array, chosen, real_array
+from svo.checks import Array, chosen, expect_shape, real_array
 
 DL, DM, DN, ETA = range(4)
 TRAVEL = np.maximum(np.abs(INPUT_LOWER), np.abs(INPUT_UPPER))
@@ -128,8 +128,7 @@ class ForceBalance:
 
     def imbalance(self, u: Array) -> Array:
         """e = f - G u (K, 3) [m/s^2]; u (K, 4) are the computed inputs of the instants that the rows are of."""
-        if u.shape != (len(self.f), 4):
-            raise ValueError(f"u has shape {u.shape}; expected {(len(self.f), 4)}, one row a measurement")
+        expect_shape(u.shape == (len(self.f), 4), "u", u, f"{(len(self.f), 4)}, one row a measurement")
         return self.f - np.einsum("kij,kj->ki", self.G, u)
 
     def weights(self, names: Sequence[str]) -> Array:

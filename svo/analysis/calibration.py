@@ -18,7 +18,7 @@ from svo.analysis.elastic_bounds import Bound, bounds_of
 from svo.analysis.elastic_program import ElasticProgram, Explained
 from svo.analysis.explanation import NEGLIGIBLE, explain
 from svo.analysis.trajectory import Trajectory
-from svo.checks import Array, bounded_box, expect, is_count
+from svo.checks import Array, bounded_box, expect, expect_shape, is_count
 from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel, expect_model
 
@@ -207,8 +207,7 @@ def _check_log(model: UncertainModel, log: Log) -> None:
     expect_log(log)
     for name, count in (("u", model.n_inputs), ("y", model.n_outputs)):
         array = getattr(log, name)
-        if array.shape[1] != count:
-            raise ValueError(f"{name} of the log has shape {array.shape}; expected ({len(log)}, {count})")
+        expect_shape(array.shape[1] == count, f"{name} of the log", array, f"({len(log)}, {count})")
         if np.isinf(array).any() or (name == "u" and np.isnan(array).any()):
             raise ValueError(f"{name} of the log contains Inf or NaN; expected finite numbers (NaN only in y)")
     if model.is_scheduled and log.schedule is None:

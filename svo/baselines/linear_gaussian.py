@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from polytopes import HPolytope
-from svo.checks import Array
+from svo.checks import Array, bounded_box
 from svo.logs.log import Log
 from svo.models import UncertainModel
 
@@ -75,9 +75,7 @@ class GaussianModel:
     def __post_init__(self) -> None:
         if self.model.n_disturbances and np.any(self._at(self.model.schedule, "F")):
             raise ValueError("model has disturbances in its output (F); expected them in the state equation only")
-        lower, upper = self.initial.bounding_box()
-        if not (np.isfinite(lower).all() and np.isfinite(upper).all() and (lower <= upper).all()):
-            raise ValueError(f"initial is between {lower} and {upper}; expected a bounded set that is not empty")
+        lower, upper = bounded_box("initial", self.initial, self.model.n_states)
         object.__setattr__(self, "mean", (lower + upper) / 2)
         object.__setattr__(self, "covariance", np.diag(VARIANCE_OF_BOUND * ((upper - lower) / 2) ** 2))
         self._check_innovation()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array, expect, finite_array, is_finite_number
+from svo.checks import Array, expect, expect_kind, finite_array, is_finite_number
 from svo.faults.profiles import Profile, check_profile
 from svo.models import UncertainModel, Uncertainty
 
@@ -40,8 +40,7 @@ class PlantFault:
     profile: Profile
 
     def __post_init__(self) -> None:
-        if not isinstance(self.direction, Uncertainty):
-            raise TypeError(f"direction is a {type(self.direction).__name__}; expected an Uncertainty")
+        expect_kind("direction", self.direction, Uncertainty, "an Uncertainty")
         check_profile(self.profile)
         is_usable = is_finite_number(self.magnitude) and self.magnitude != 0
         expect(is_usable, "magnitude", self.magnitude, "a finite number, not zero")

@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from svo.checks import Array, expect, finite_array, is_finite_number, positive_number, readings, real_array
+from svo.checks import Array, expect, expect_kind, finite_array, is_finite_number, positive_number, readings, real_array
 
 EDGE_TOLERANCE_S = 1e-9
 
@@ -118,8 +118,7 @@ def at_times(name: str, t: ArrayLike, values: ArrayLike) -> Array:
 
 def check_profile(profile: Any) -> None:
     """Refuse what has no ``start`` and ``value``."""
-    if not isinstance(profile, Profile):
-        raise TypeError(f"profile is a {type(profile).__name__}; expected a Profile, such as Step(1.0)")
+    expect_kind("profile", profile, Profile, "a Profile, such as Step(1.0)")
 
 
 def _check_finite(name: str, value: float) -> None:

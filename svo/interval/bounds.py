@@ -111,9 +111,7 @@ _RANGES = (
 
 
 def _checked(name: str, value: Any, lowest: float, highest: float) -> float | Array:
-    array = real_array(f"{name} of the gain bounds", value, finite=False)
-    if array.ndim > 1:
-        raise ValueError(f"{name} of the gain bounds has shape {array.shape}; expected a number or (K,)")
+    array = real_array(f"{name} of the gain bounds", value, (), ("K",), finite=False)
     bad = np.flatnonzero(~((array >= lowest) & (array <= highest)))
     if bad.size:
         where = "" if array.ndim == 0 else f"[{bad[0]}]"

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
-from svo.checks import Array, expect, real_array
+from svo.checks import Array, expect, expect_kind, expect_shape, real_array
 from svo.interval.bounds import GainBounds
 from svo.interval.noise import NoiseCharacterization
 from svo.interval.predictor import Interval, IntervalPrediction, IntervalPredictor
@@ -122,10 +122,8 @@ class IntervalDetector:
     """
 
     def __init__(self, predictor: IntervalPredictor, noise: NoiseCharacterization, pole: float) -> None:
-        if not isinstance(predictor, IntervalPredictor):
-            raise TypeError(f"predictor is {type(predictor).__name__}; expected an IntervalPredictor")
-        if not isinstance(noise, NoiseCharacterization):
-            raise TypeError(f"noise is {type(noise).__name__}; expected a NoiseCharacterization")
+        expect_kind("predictor", predictor, IntervalPredictor, "an IntervalPredictor")
+        expect_kind("noise", noise, NoiseCharacterization, "a NoiseCharacterization")
         check_pole(pole)
         self.predictor, self.noise, self.pole = predictor, noise, float(pole)
         self._thresholds = noise.thresholds(pole)
@@ -153,7 +151,7 @@ class IntervalDetector:
         begun = perf_counter()
         if self._started:
             raise ValueError("update was called after the first sample; use step(u, y), or reset to start again")
-        measured = _measurement(y0)
+        measured = _number("y", y0, missing=True)
         self._started = True
         return self._judge(measured, schedule, begun)
 
@@ -182,7 +180,7 @@ class IntervalDetector:
             For values that are no finite numbers, or bounds that break (17). The detector is unchanged.
         """
         begun = perf_counter()
-        measured = _measurement(y)
+        measured = _number("y", y, missing=True)
         if not self._started:
             if schedule is not None:
                 raise ValueError(
@@ -247,22 +245,12 @@ class IntervalDetector:
         )
 
 
-def _number(name: str, value: Any) -> float:
+def _number(name: str, value: Any, missing: bool = False) -> float:
+    """One finite number; NaN too, where it may be missing."""
     if not isinstance(value, float):
-        value = _only(name, real_array(name, value, finite=False))
-    expect(isfinite(value), name, value, "a finite number")
+        array = real_array(name, value, finite=False, missing=missing)
+        expect_shape(array.size == 1, name, array, "one number")
+        value = float(array.item())
+    fits = isfinite(value) or (missing and isnan(value))
+    expect(fits, name, value, "a finite number, or NaN if it is missing" if missing else "a finite number")
     return float(value)
-
-
-def _measurement(y: Any) -> float:
-    if not isinstance(y, float):
-        y = _only("y", real_array("y", y, finite=False, missing=True))
-    if abs(y) == np.inf:
-        raise ValueError(f"y is {y}; expected a finite number, or NaN if it is missing")
-    return float(y)
-
-
-def _only(name: str, array: Array) -> float:
-    if array.size != 1:
-        raise ValueError(f"{name} has shape {array.shape}; expected one number")
-    return float(array.item())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from svo.checks import Array, finite_array
+from svo.checks import Array, expect_shape, finite_array
 from svo.interval.thresholds import checked_bounds
 
 DEFAULT_EXPONENTS: tuple[float, ...] = tuple(np.round(np.arange(-2.0, 0.0, 0.05), 2).tolist())
@@ -45,8 +45,7 @@ def smallest_power_law(bounds: ArrayLike, exponents: ArrayLike = DEFAULT_EXPONEN
         If the solver fails.
     """
     lam, grid = checked_bounds(bounds), finite_array("exponents", exponents)
-    if grid.ndim != 1 or not grid.size:
-        raise ValueError(f"exponents has shape {grid.shape}; expected (m,) finite numbers, at least one")
+    expect_shape(grid.ndim == 1 and grid.size, "exponents", grid, "(m,) finite numbers, at least one")
     return min((_best(lam, float(gamma)) for gamma in grid), key=lambda law: float(np.mean(law.bounds(lam.size))))
 
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, is_finite_number, real_number
+from svo.checks import Array, expect_shape, is_finite_number, real_number
 from svo.interval import kernel
 from svo.interval.bounds import GainBounds, GainLaw
 from svo.interval.residual import dead_zone
@@ -221,8 +221,7 @@ def held(y: Array, first: float) -> Array:
 
 def _channel(log: Log, name: str) -> Array:
     values: Array = getattr(log, name)
-    if values.shape[1] != 1:
-        raise ValueError(f"{name} of the log has shape {values.shape}; expected ({len(log)}, 1), one channel")
+    expect_shape(values.shape[1] == 1, f"{name} of the log", values, f"({len(log)}, 1), one channel")
     return np.ascontiguousarray(values[:, 0])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, expect, real_array
+from svo.checks import Array, expect, expect_shape, real_array
 from svo.interval.residual import check_pole
 
 _EPS, _SMALLEST = float(np.finfo(float).eps), float(np.finfo(float).smallest_subnormal)
@@ -72,8 +72,7 @@ def threshold_sequence(bounds: ArrayLike, pole: float) -> Array:
 def checked_bounds(bounds: ArrayLike) -> Array:
     """Bounds lambda_q as a read-only array (qbar,), finite and not negative; ValueError otherwise."""
     array = real_array("bounds", bounds, finite=False)
-    if array.ndim != 1 or not array.size:
-        raise ValueError(f"bounds has shape {array.shape}; expected (qbar,), one bound a window length")
+    expect_shape(array.ndim == 1 and array.size, "bounds", array, "(qbar,), one bound a window length")
     wrong = np.flatnonzero(~(np.isfinite(array) & (array >= 0)))
     if wrong.size:
         raise ValueError(f"lambda_{wrong[0] + 1} is {array[wrong[0]]}; expected a finite bound >= 0")

@@ -8,8 +8,8 @@ import numpy as np
 
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
-from svo.checks import Array
-from svo.isolation.bank import Bank, falsified_and_undecided, largest_at
+from svo.checks import Array, bounded_box
+from svo.isolation.bank import Bank, falsified_and_undecided
 from svo.isolation.bank_checks import by_name, check_counts
 from svo.isolation.bank_state import Sample
 from svo.isolation.global_logic import GlobalLogic
@@ -78,15 +78,13 @@ class ArchitectureI(Bank):
     def _forget(self) -> None:
         super()._forget()
         self._hull: Box | None = None
-        self._largest_at: int | None = None  # what the hull rests on
 
     def _memory(self) -> dict[str, Array]:
-        return ({} if self._hull is None else {"hull": np.array(self._hull)}) | _sample_array(self._largest_at)
+        return {} if self._hull is None else {"hull": np.array(self._hull)}
 
     def _recall(self, arrays: Mapping[str, Array]) -> None:
         hull = arrays.get("hull")
         self._hull = None if hull is None else (hull[0], hull[1])
-        self._largest_at = _sample_of(arrays)
 
     def _begin_again(
         self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
@@ -97,7 +95,7 @@ class ArchitectureI(Bank):
         survivors = [name for name in steps if name not in falsified]
         if survivors:
             self._hull = _hull([steps[name].box for name in survivors])
-            self._largest_at = _at_sample(k, largest_at(self.observers, steps, survivors))
+            self._rest_on(k, steps, survivors)
             for name in state.restart:
                 self._start_from(name, _box(self._hull), now, largest_at=_age(k, self._largest_at))
         elif self._hull is None:
@@ -179,7 +177,8 @@ class ArchitectureII(Bank):
         _check_class_one(class_one, faults)
         self._constant: HPolytope | None = None
         if isinstance(global_, HPolytope):
-            self._constant = _checked_set(global_, nominal.model.n_states)
+            bounded_box("global_", global_, nominal.model.n_states)
+            self._constant = global_
         else:
             observers[GLOBAL] = global_
         class_two = tuple(name for name in faults if name not in class_one)
@@ -189,15 +188,12 @@ class ArchitectureII(Bank):
     def _forget(self) -> None:
         super()._forget()
         self._global_set = self._constant
-        self._largest_at: int | None = None  # what the global set rests on
 
     def _memory(self) -> dict[str, Array]:
-        known = {} if self._global_set is None else arrays_of("global", self._global_set)
-        return known | _sample_array(self._largest_at)
+        return {} if self._global_set is None else arrays_of("global", self._global_set)
 
     def _recall(self, arrays: Mapping[str, Array]) -> None:
         self._global_set = read_arrays(HPolytope, "global", arrays) if "global.A" in arrays else None
-        self._largest_at = _sample_of(arrays)
 
     def _begin_again(
         self, state: LogicState, k: int, steps: dict[str, Step], falsified: Collection[str], now: Sample
@@ -221,7 +217,7 @@ class ArchitectureII(Bank):
             self._global_set = self._predict_from(GLOBAL, _bounded(self._global_set), now, since).set
         elif GLOBAL in steps and (state.restart or self._logic.may_restart):
             self._global_set = steps[GLOBAL].set
-            self._largest_at = _at_sample(k, largest_at(self.observers, steps, [GLOBAL]))
+            self._rest_on(k, steps, [GLOBAL])
 
     def _start(self, state: LogicState, k: int, steps: dict[str, Step], now: Sample) -> list[str]:
         """Start observers, keep the answers of those that did not fall, and say which fell at once."""
@@ -258,22 +254,9 @@ def _has_largest_set(observer: Observer) -> bool:
     return observer.model.start_range is not None and observer.starts_without_set
 
 
-def _at_sample(k: int, age: int | None) -> int | None:
-    """The bank's number of a sample that is counted from sample k."""
-    return None if age is None else k + age
-
-
 def _age(k: int, sample: int | None) -> int | None:
-    """The other way."""
+    """A sample as counted from sample k."""
     return None if sample is None else sample - k
-
-
-def _sample_array(sample: int | None) -> dict[str, Array]:
-    return {} if sample is None else {"largest_at": np.array(float(sample))}
-
-
-def _sample_of(arrays: Mapping[str, Array]) -> int | None:
-    return int(arrays["largest_at"]) if "largest_at" in arrays else None
 
 
 def _check_class_one(class_one: Collection[str], faults: Mapping[str, Observer]) -> None:
@@ -282,11 +265,3 @@ def _check_class_one(class_one: Collection[str], faults: Mapping[str, Observer])
     for name in class_one:
         if name not in faults:
             raise ValueError(f"class_one has the name {name!r}; expected names among the faults: {', '.join(faults)}")
-
-
-def _checked_set(set: HPolytope, n_states: int) -> HPolytope:
-    if set.dim != n_states:
-        raise ValueError(f"global_ has dimension {set.dim}; expected {n_states}, the number of states")
-    if set.emptiness().status != "nonempty" or not set.is_bounded():
-        raise ValueError("global_ is empty or unbounded; expected a bounded set that the state never leaves")
-    return set

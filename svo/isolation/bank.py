@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
-from svo.checks import expect, is_count, is_finite_number
+from svo.checks import Array, expect, expect_kind, expect_shape, is_count, is_finite_number
 from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import BankState, Sample, restored, saved
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
@@ -183,7 +183,10 @@ class Bank(ABC):
             If an observer has no ``state_dict``, or the schedule is no number or array of numbers.
         """
         observers = {name: saved(name, observer) for name, observer in self.observers.items()}
-        return BankState(self._kind, self._sample, self._state, self._latest, self._memory(), observers).arrays()
+        memory = self._memory()
+        if self._largest_at is not None:
+            memory["largest_at"] = np.array(float(self._largest_at))
+        return BankState(self._kind, self._sample, self._state, self._latest, memory, observers).arrays()
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on bit for bit from what `state_dict` gave; this bank must be built as that one was.
@@ -195,8 +198,7 @@ class Bank(ABC):
         ValueError
             If the state is that of a bank with other models or options, or is incomplete. The bank is unchanged.
         """
-        if not isinstance(state, Mapping):
-            raise TypeError(f"state is a {type(state).__name__}; expected the named arrays that state_dict() gave")
+        expect_kind("state", state, Mapping, "the named arrays that state_dict() gave")
         try:
             self._resume(BankState.of_arrays(state))
         except (AttributeError, KeyError, TypeError, ValueError) as error:
@@ -298,6 +300,7 @@ class Bank(ABC):
     def _forget(self) -> None:
         self._sample: int | None = None
         self._refused_by = None
+        self._largest_at: int | None = None  # what the set that observers start from rests on
         self._latest = Sample(None, self._nothing(), None, None)
         self._adopt(self._logic.initial())
 
@@ -312,6 +315,7 @@ class Bank(ABC):
             raise ValueError(f"it is of {state.kind}, this bank is {self._kind}")
         observers = {name: restored(name, observer, state.observers[name]) for name, observer in self.observers.items()}
         self._recall(state.memory)
+        self._largest_at = int(state.memory["largest_at"]) if "largest_at" in state.memory else None
         self.observers = MappingProxyType(observers)
         self._sample, self._latest, self._refused_by = state.sample, state.latest, None
         self._adopt(state.logic)
@@ -334,6 +338,11 @@ class Bank(ABC):
             self._adopt(state)
         self._sample, self._latest = k, now
         return Verdict(k, state.state, state.fault, state.alive, state.detected_at, state.isolated_at, steps)
+
+    def _rest_on(self, k: int, steps: Mapping[str, Step], names: Collection[str]) -> None:
+        """Note the newest sample at which a set that one of these rests on was the largest; k is the present one."""
+        own = [(steps[name], self.observers[name].largest_at) for name in names]
+        self._largest_at = max((k + at - step.sample for step, at in own if at is not None), default=None)
 
     def _start_from(
         self, name: str, set: HPolytope | None, at: Sample, y: ArrayLike | None = None, largest_at: int | None = None
@@ -376,16 +385,8 @@ class Bank(ABC):
             raise ValueError("run was called on a bank that has already started; call reset(set), or use a fresh bank")
         model = self.observers[NOMINAL].model
         for name, wanted in (("u", model.n_inputs), ("y", model.n_outputs)):
-            shape = getattr(log, name).shape
-            if shape[1] != wanted:
-                raise ValueError(f"log.{name} has shape {shape}; expected (samples, {wanted}), as the models have")
-
-
-def largest_at(observers: Mapping[str, Observer], steps: Mapping[str, Step], names: Collection[str]) -> int | None:
-    """Newest sample, counted from the present one, at which a set that one of these rests on was the largest set."""
-    own = [(steps[name], observers[name].largest_at) for name in names]
-    ages = [at - step.sample for step, at in own if at is not None]
-    return max(ages, default=None)
+            array: Array = getattr(log, name)
+            expect_shape(array.shape[1] == wanted, f"log.{name}", array, f"(samples, {wanted}), as the models have")
 
 
 def falsified_and_undecided(steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:

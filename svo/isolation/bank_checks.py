@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from svo.checks import expect, is_count
+from svo.checks import expect, expect_kind, is_count
 from svo.isolation.logic import NOMINAL
 from svo.observers.base import Observer
+
+_AN_OBSERVER = (
+    "an observer, such as WindowObserver(model, initial): one of your own is a subclass of svo.observers.base.Observer"
+)
 
 
 def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[str, ...]) -> dict[str, Observer]:
     """All models' observers by name, the nominal one first; refuses bad names and the reserved ones."""
     taken = " or ".join(repr(name) for name in reserved)
-    if not isinstance(faults, Mapping):
-        raise TypeError(f"faults is a {type(faults).__name__}; expected a mapping of fault names to observers")
+    expect_kind("faults", faults, Mapping, "a mapping of fault names to observers")
     for name in faults:
         if not isinstance(name, str) or not name.strip() or name in reserved:
             raise ValueError(f"faults has the name {name!r}; expected a string that is not empty and not {taken}")
     observers = {NOMINAL: nominal, **faults}
     for name, observer in observers.items():
-        if not isinstance(observer, Observer):
-            kind = type(observer).__name__
-            raise TypeError(
-                f"{name!r} is a {kind}; expected an observer, such as WindowObserver(model, initial): one of your own "
-                "is a subclass of svo.observers.base.Observer"
-            )
+        expect_kind(repr(name), observer, Observer, _AN_OBSERVER)
     return observers
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, readings, real_array
+from svo.checks import Array, expect_kind, expect_shape, readings, real_array
 from svo.logs import frames
 from svo.logs.columns import checked_parts
 from svo.logs.names import Columns
@@ -53,10 +53,8 @@ class Log:
             if value is None and name in ("x", "schedule"):
                 continue
             array = readings(name, value) if name in ("y", "x") else real_array(name, value)
-            if array.shape[:1] != time.shape or (name != "schedule" and array.ndim != 2):
-                raise ValueError(
-                    f"{name} has shape {array.shape}; expected ({time.size}, channels), one row a sample of time"
-                )
+            fits = array.shape[:1] == time.shape and (name == "schedule" or array.ndim == 2)
+            expect_shape(fits, name, array, f"({time.size}, channels), one row a sample of time")
             object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
@@ -170,7 +168,6 @@ class Log:
 
 def expect_log(log: Any) -> None:
     """Refuse what is no log, or has no samples."""
-    if not isinstance(log, Log):
-        raise TypeError(f"log is {type(log).__name__}; expected an svo.Log, such as svo.logs.file.read_log gives")
+    expect_kind("log", log, Log, "an svo.Log, such as svo.logs.file.read_log gives")
     if len(log) == 0:
         raise ValueError("log has no samples; expected at least one")

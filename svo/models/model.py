@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
-from svo.checks import Array, finite_array, listed, positive_number
+from svo.checks import Array, expect_kind, expect_shape, finite_array, listed, positive_number
 from svo.logs.log import Log
 from svo.models.bounds import Bounds, bounds_of
 from svo.models.discretisation import check_constant
@@ -216,8 +216,7 @@ class UncertainModel:
         if schedule is None:
             raise ValueError("schedule is missing: the model has arrays or bounds that are functions of it")
         values: Array = finite_array("schedule", schedule)
-        if values.ndim == 0 or len(values) == 0:
-            raise ValueError(f"schedule has shape {values.shape}; expected (K, ...), one value a sample")
+        expect_shape(values.ndim and len(values), "schedule", values, "(K, ...), one value a sample")
         typical: Array = finite_array("schedule of the model", self.schedule)
         if typical.shape != values.shape[1:]:
             raise ValueError(f"schedule has shape {values.shape[1:]} at a sample; expected {typical.shape}")
@@ -376,10 +375,8 @@ class UncertainModel:
         """
         inputs = finite_array("u", u, ("samples", self.n_inputs))
         x: Array = finite_array("x0", x0, (self.n_states,))
-        if not len(inputs):
-            raise ValueError(f"u has shape {inputs.shape}; expected (samples, {self.n_inputs}), at least one sample")
-        if not isinstance(rng, np.random.Generator):
-            raise TypeError(f"rng is {rng!r}; expected a numpy Generator, such as np.random.default_rng(0)")
+        expect_shape(len(inputs), "u", inputs, f"(samples, {self.n_inputs}), at least one sample")
+        expect_kind("rng", rng, np.random.Generator, "a numpy Generator, such as np.random.default_rng(0)")
         values = None if schedule is None else finite_array("schedule", schedule)
         if values is None and self.is_scheduled:
             raise ValueError(
@@ -409,5 +406,4 @@ class UncertainModel:
 
 def expect_model(name: str, value: Any) -> None:
     """TypeError unless it is a model."""
-    if not isinstance(value, UncertainModel):
-        raise TypeError(f"{name} is {type(value).__name__}; expected an UncertainModel")
+    expect_kind(name, value, UncertainModel, "an UncertainModel")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import norm
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, finite_array, readings
+from svo.checks import Array, expect_shape, finite_array, readings
 from svo.residual_tests.interface import (
     DecisionRecord,
     WindowTest,
@@ -142,8 +142,7 @@ def propagated_bounds(
     n, nw = matrices["B"].shape if matrices["B"].ndim == 2 else (-1, -1)
     nr = len(matrices["C"])
     for name, shape in (("A", (n, n)), ("C", (nr, n)), ("D", (nr, nw))):
-        if matrices[name].shape != shape:
-            raise ValueError(f"{name} has shape {matrices[name].shape}; expected {shape}, to fit B {(n, nw)}")
+        expect_shape(matrices[name].shape == shape, name, matrices[name], f"{shape}, to fit B {(n, nw)}")
     if low.shape != (nw,) or high.shape != (nw,) or (low > high).any():
         raise ValueError(f"lower is {low} and upper {high}; expected ({nw},) each, lower <= upper")
     least, largest = np.empty((samples, nr)), np.empty((samples, nr))

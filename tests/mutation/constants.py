@@ -84,7 +84,6 @@ CONSTANTS = (
     Constant("svo.observers.zonotope.program", "_INSIDE", "heuristic"),
     Constant("svo.observers.zonotope.program", "_MISFIT", "heuristic"),
     Constant("svo.detectors.interval", "_HAIR", "heuristic"),
-    Constant("polytopes.outer_supports", "_SHARP", "heuristic"),
     Constant("polytopes.pontryagin_difference", "_CONSTANT", "heuristic"),
     Constant("polytopes.pontryagin_difference", "_ROUNDED", "heuristic"),
     Constant("polytopes.hull", "_FLAT", "heuristic"),

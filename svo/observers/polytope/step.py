@@ -10,8 +10,6 @@ from polytopes import HPolytope
 from svo.checks import Array
 from svo.models import NormalForm, set_in
 from svo.observers.answers import Step
-from svo.observers.polytope.vertex_images import outer_support
-from svo.observers.readings import OUTGROWN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,16 +33,9 @@ class PolytopeStep(Step):
         return set_in(states, 1.0 / self._form.x)
 
     def _box(self) -> tuple[Array, Array]:
-        unit = self._form.x
-        if self.reason == OUTGROWN:
-            lower, upper = self._joint.bounding_box()
-            return lower * unit, upper * unit
-        axes = np.eye(self.n, self._joint.dim)
-        ends = outer_support(self._joint, np.vstack([axes, -axes]))
-        return -ends[self.n :] * unit, ends[: self.n] * unit
+        lower, upper = self._joint.bounding_box()
+        return lower[: self.n] * self._form.x, upper[: self.n] * self._form.x
 
     def _support(self, rows: Array) -> Array:
-        normal = rows * self._form.x
-        if self.reason == OUTGROWN:
-            return np.asarray(self._joint.support(normal), dtype=np.float64)
-        return outer_support(self._joint, np.hstack([normal, np.zeros((len(rows), self._joint.dim - self.n))]))
+        of_disturbances = np.zeros((len(rows), self._joint.dim - self.n))
+        return np.asarray(self._joint.support(np.hstack([rows * self._form.x, of_disturbances])))

@@ -15,7 +15,7 @@ from time import perf_counter
 from flint import fmpq
 
 from polytopes.exact import rational
-from svo.checks import Array
+from svo.checks import Array, expect_kind
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.observers.window.certificate import WindowCertificate
@@ -89,8 +89,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
         If a late measurement arrived after the log's end, or before it was taken; and as `WindowObserver.step` and
         `WindowObserver.late_update` do.
     """
-    if not isinstance(observer, WindowObserver):
-        raise TypeError(f"observer is a {type(observer).__name__}; expected a WindowObserver, the only kind proven")
+    expect_kind("observer", observer, WindowObserver, "a WindowObserver, the only kind proven")
     expect_log(log)
     begun = perf_counter()
     waiting = list(late)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from polytopes import HPolytope
+from svo.checks import bounded_box
 from svo.models import UncertainModel, Uncertainty
 from svo.models.mat import read_arrays
 from svo.plant.description.table import Table
@@ -83,10 +84,7 @@ def box_of(table: Table, n_states: int) -> HPolytope:
             found = HPolytope(table.array("A"), table.array("b"))
         else:
             found = HPolytope.box(table.array("lower"), table.array("upper"))
-        if found.dim != n_states:
-            raise ValueError(f"has {found.dim} dimensions; expected {n_states}, the number of states")
-        if found.emptiness().status != "nonempty" or not found.is_bounded():
-            raise ValueError("is empty or unbounded; expected a bounded set with a point")
+        bounded_box("the set", found, n_states)
     return found
 
 

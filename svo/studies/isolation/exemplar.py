@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.checks import Array
+from svo.checks import Array, expect_shape
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.base import Step
@@ -107,8 +107,7 @@ def _decode(data: Mapping[str, NDArray[Any]]) -> Exemplar:
     header = json.loads(str(data["header"]))
     names = tuple(map(str, header["names"]))
     arrays = {name: data[name] for name in ("time", "alive", "lower", "upper", "x")}
-    if arrays["x"].ndim != 2:
-        raise ValueError(f"x has the shape {arrays['x'].shape}; expected (samples, states)")
+    expect_shape(arrays["x"].ndim == 2, "x", arrays["x"], "(samples, states)")
     samples, states = arrays["x"].shape
     shapes = {"time": (samples,), "alive": (samples, len(names)), "x": (samples, states)}
     shapes |= dict.fromkeys(("lower", "upper"), (samples, len(names), states))

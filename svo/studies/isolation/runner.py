@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from time import perf_counter
 
-import polytopes
-from svo.plant import HEALTHY, Plant
 from svo.studies.configuration import StudyConfiguration
 from svo.studies.engine import Place, Progress
 from svo.studies.isolation.run import run_registered
@@ -64,12 +61,3 @@ def run_study(
     place, folder = Place(workers, scheduler, limit), StudyFolder(Path(out))
     run_into(folder, run_registered, configuration, place, resume=resume, retry_failed=retry_failed, progress=progress)
     return folder
-
-
-def warm_up(plant: Plant, noise: str) -> float:
-    """Compile what a study needs: simulator, observers and, for the pictures, sets; returns the seconds it took."""
-    begun = perf_counter()
-    plant.simulate(HEALTHY, HEALTHY, noise, 0)
-    plant.bank(noise).warm_up()
-    polytopes.warm_up()
-    return perf_counter() - begun

@@ -24,7 +24,7 @@ def test_what_is_no_model_is_named(given: Any) -> None:
         (lambda: calibrate(given, None, BOX), "model"),  # type: ignore[arg-type]
         (lambda: WindowObserver(given, BOX), "model"),
     ):
-        with pytest.raises(TypeError, match=f"^{name} is {kind}; expected an UncertainModel"):
+        with pytest.raises(TypeError, match=f"^{name} is a {kind}; expected an UncertainModel"):
             call()
 
 

@@ -33,8 +33,8 @@ LOG = read_log(EXAMPLES / "cart.csv", CART.columns, CART.Ts)
         (lambda: replace(LOG, y=np.hstack([LOG.y, LOG.y])), "y of the log has 2 channels; expected 1"),
         (lambda: replace(LOG, u=LOG.u[:, :0]), "u of the log has 0 channels; expected 1"),
         (lambda: Log(LOG.time[:0], LOG.u[:0], LOG.y[:0]), "log has no samples"),
-        (lambda: LOG.to_dataframe(CART.columns), "log is DataFrame; expected an svo.Log"),
-        (lambda: "cart.csv", "log is str; expected an svo.Log, such as svo.logs.file.read_log gives"),
+        (lambda: LOG.to_dataframe(CART.columns), "log is a DataFrame; expected an svo.Log"),
+        (lambda: "cart.csv", "log is a str; expected an svo.Log, such as svo.logs.file.read_log gives"),
     ],
 )
 def test_a_log_that_is_none_of_the_plant_is_refused(
@@ -108,7 +108,7 @@ def test_a_frame_is_no_log() -> None:
         lambda: calibrate(CART.model, frame, start),
         lambda: prove_chain(WindowObserver(CART.model, start), frame),
     ):
-        with pytest.raises(TypeError, match=r"log is DataFrame; expected an svo\.Log"):
+        with pytest.raises(TypeError, match=r"log is a DataFrame; expected an svo\.Log"):
             run()
 
 

@@ -130,8 +130,8 @@ def test_a_step_before_the_first_measurement_predicts_only() -> None:
         (lambda d: d.step(0.0, np.inf), "y is inf"),
         (lambda d: d.step(np.nan, 0.0), "u is nan"),
         (lambda d: d.step([1.0, 2.0], 0.0), r"u has shape \(2,\)"),
-        (lambda d: IntervalDetector(d, d.noise, 0.9), "predictor is IntervalDetector"),
-        (lambda d: IntervalDetector(d.predictor, d.noise.bounds, 0.9), "noise is ndarray"),
+        (lambda d: IntervalDetector(d, d.noise, 0.9), "predictor is a IntervalDetector"),
+        (lambda d: IntervalDetector(d.predictor, d.noise.bounds, 0.9), "noise is a ndarray"),
         (lambda d: IntervalDetector(d.predictor, d.noise, 1.0), "pole is 1.0"),
     ],
 )

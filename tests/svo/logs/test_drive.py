@@ -50,7 +50,7 @@ def test_a_scheduler_hears_of_each_sample_in_turn_and_options_are_those_of_a_ste
 @pytest.mark.parametrize(
     ("log", "error", "match"),
     [
-        ([1.0], TypeError, "log is list; expected an svo.Log"),
+        ([1.0], TypeError, "log is a list; expected an svo.Log"),
         (Log(time=np.zeros(0), u=np.zeros((0, 1)), y=np.zeros((0, 1))), ValueError, "log has no samples"),
     ],
 )

@@ -384,7 +384,7 @@ def test_mistakes_in_a_simulation_are_named(changes: dict[str, Any], message: st
     given_arrays: dict[str, Any] = {"x0": [1.0], "u": np.zeros((4, 0)), "schedule": np.ones(4)}
     with pytest.raises(ValueError, match=message):
         model.simulate(rng=np.random.default_rng(0), **given_arrays | changes)
-    with pytest.raises(TypeError, match=r"rng is 0; expected a numpy Generator"):
+    with pytest.raises(TypeError, match=r"rng is a int; expected a numpy Generator"):
         model.simulate(rng=0, **given_arrays)  # type: ignore[arg-type]
 
 

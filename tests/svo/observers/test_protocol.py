@@ -144,7 +144,7 @@ def test_wrong_data_are_refused_and_leave_the_observer_as_it_was(kind: Any) -> N
 @every_observer
 def test_what_is_no_log_is_named(kind: Any) -> None:
     observer = kind(cart(), BOX)
-    with pytest.raises(TypeError, match="log is ndarray; expected"):
+    with pytest.raises(TypeError, match="log is a ndarray; expected"):
         observer.run(np.zeros((3, 1)))
     with pytest.raises(ValueError, match="log has no samples"):
         observer.run(Log(np.zeros(0), np.zeros((0, 1)), np.zeros((0, 1))))

@@ -16,9 +16,10 @@ from svo.plant import Column, Plant, load_plant
 from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar, Snapshot
 from svo.studies.isolation.figures import write_pictures
-from svo.studies.isolation.report import write_page, write_report
+from svo.studies.isolation.publish import write_report
 from svo.studies.isolation.run import RunRow
 from svo.studies.isolation.summary import ConditionSummary, summarise
+from svo.studies.page import write_page
 
 STATES = (Column("speed_m_s", "m/s"), Column("angle_rad", "rad"), Column("rate", "rad/s"))
 NAMES = ("nominal", "leak", "gauge")
