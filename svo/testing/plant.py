@@ -87,6 +87,9 @@ def fresh_banks(runs: PlantRuns) -> Iterator[str]:
 )
 def length(runs: PlantRuns) -> Iterator[str]:
     plant = runs.plant
+    for fault, profiles in plant.faults.items():
+        if not len(profiles):
+            yield f"faults[{fault!r}] has no profile, so it cannot be simulated"
     for scenario in (*runs.healthy, *runs.faulty):
         log, promised = runs.log(scenario), plant.duration(scenario.fault, scenario.profile) / plant.Ts
         if len(log) not in (round(promised), round(promised) + 1):
@@ -109,6 +112,9 @@ def channels(runs: PlantRuns) -> Iterator[str]:
             value = getattr(log, name)
             if group and (value is None or value.shape[1] != len(group)):
                 yield f"{scenario} has {name} of shape {np.shape(value)}; columns names {len(group)} channels"
+    for scenario in runs.healthy:
+        if np.isnan(runs.log(scenario).y).all():
+            yield f"{scenario} has no reading of any sensor"
 
 
 @rule(
@@ -214,6 +220,19 @@ def _between(lower: np.ndarray, x: np.ndarray, upper: np.ndarray) -> bool:
 
 
 @rule(
+    "a run with a fault is another one than the run of the same seed without",
+    advice="let simulate() act on the fault and the profile that it is asked for",
+)
+def fault_acts(runs: PlantRuns) -> Iterator[str]:
+    healthy = runs.log(runs.healthy[0])
+    for scenario in runs.faulty:
+        log = runs.log(scenario)
+        samples = min(len(log), len(healthy))
+        if samples > runs.first_faulty(scenario) and _same(cut(log, 0, samples), cut(healthy, 0, samples)):
+            yield f"{scenario} gives the log of a run without a fault"
+
+
+@rule(
     "a fault's own observer is not falsified by that fault, whatever its profile",
     advice="let the fault's model allow at least the size of every profile, on the channel that simulate() corrupts",
 )
@@ -249,5 +268,6 @@ PLANT_RULES = table(
     stated_noise,
     stated_disturbances,
     healthy_bank,
+    fault_acts,
     own_fault,
 )

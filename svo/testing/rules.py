@@ -63,7 +63,7 @@ class Rule(Generic[Subject]):
             found = next(iter(self.breaches(subject)), None)
         except (NotApplicable, ConformanceError):
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # sys.exit(0) would end the caller's tests as if all held
             raise ConformanceError(self, f"{type(error).__name__}: {error}") from error
         if found is not None:
             raise ConformanceError(self, found)

@@ -13,7 +13,7 @@ from svo.plant.description import read_description
 from svo.testing import PLANT_RULES, ConformanceError, PlantRuns, check_plant
 from tests.svo.studies.isolation.registered.tank_plant import Tank, TankOfTwoBanks
 from tests.testing.broken.first_breach import broken_rules
-from tests.testing.broken.plants import BROKEN_PLANTS, TooShort
+from tests.testing.broken.plants import BROKEN_PLANTS, EndsThePython, TooShort
 
 ROOT = Path(__file__).parents[2]
 
@@ -39,6 +39,7 @@ def test_a_description_keeps_what_can_be_asked_without_a_simulator(file: str) ->
 FOLLOWS = {
     "input of its sample": {"stated disturbances", "healthy bank", "own fault"},
     "stated noise": {"healthy bank", "own fault"},
+    "channels": {"fault acts"},
 }
 
 
@@ -47,6 +48,16 @@ def test_a_broken_plant_is_caught_by_its_own_rule(broken: Any) -> None:
     own, found = BROKEN_PLANTS[broken], broken_rules(PLANT_RULES, PlantRuns(broken()))
     assert found[0] == own
     assert set(found) <= {own} | FOLLOWS.get(own, set())
+
+
+def test_a_simulator_that_ends_python_is_a_breach() -> None:
+    with pytest.raises(ConformanceError, match="SystemExit"):
+        check_plant(EndsThePython())
+
+
+def test_a_fault_without_a_profile_is_named() -> None:
+    with pytest.raises(ConformanceError, match=r"faults\['heater'\] has no profile"):
+        check_plant(HeatedTank(faults={"heater": (), "thermometer": ()}))
 
 
 def test_the_error_says_which_rule_what_was_seen_and_what_to_do() -> None:

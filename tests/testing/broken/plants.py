@@ -60,10 +60,34 @@ class FaultNotInItsModel(HeatedTank):
         return ArchitectureI(WindowObserver(nominal, start), observers)
 
 
+class ForgetsTheFault(HeatedTank):
+    """Every run is a healthy one."""
+
+    def simulate(self, fault: str, profile: str, noise: str, seed: Any) -> Log:
+        return super().simulate("none", "none", noise, seed)
+
+
+class ReadsNothing(HeatedTank):
+    """Its logs have a row for every sample, and no reading in any."""
+
+    def simulate(self, *asked: Any) -> Log:
+        log = super().simulate(*asked)
+        return replace(log, y=np.full_like(log.y, np.nan))
+
+
+class EndsThePython(HeatedTank):
+    """Its simulator is a script that ends with ``sys.exit()``: the caller's tests ended with it, and passed."""
+
+    def simulate(self, *asked: Any) -> Log:
+        raise SystemExit(0)
+
+
 BROKEN_PLANTS = {
     TooShort: "length",
     ShiftedInput: "input of its sample",
     WiderNoise: "stated noise",
     TwoLogs: "one seed",
     FaultNotInItsModel: "own fault",
+    ForgetsTheFault: "fault acts",
+    ReadsNothing: "channels",
 }
