@@ -8,14 +8,12 @@ bound of ``c'x``; along the axes it bounds |x| itself.
 from fractions import Fraction
 
 import numpy as np
-from flint import fmpq
 
 from polytopes.checks import Floats
 from polytopes.duality import equality_multipliers
 from polytopes.errors import UndecidedError
-from polytopes.exact_simplex import affordable, exact_feasibility, exact_maximum
 from polytopes.integers import up
-from polytopes.linear_program import Maxima
+from polytopes.linear_program import Maxima, Program
 from polytopes.outward_normals import support_of
 from polytopes.rows import Rows
 from polytopes.support import maxima
@@ -115,24 +113,15 @@ def _proved_reach(values: Floats, constant: Floats, weights: Floats) -> Floats |
 def exact_supports(P: Rows, directions: Floats) -> list[Fraction] | None:
     """Exact supports of a nonempty set along directions in which it is bounded; None if that costs too much."""
     exact = P.exact
-    found = [support_of(exact, row) if exact is not None else _by_simplex(P, row) for row in directions]
+    found = _by_simplex(P.program, directions) if exact is None else [support_of(exact, row) for row in directions]
     fractions = [value for value in found if isinstance(value, Fraction)]
-    return fractions if len(fractions) == len(found) else None
+    return fractions if len(fractions) == len(directions) else None
 
 
-def _by_simplex(P: Rows, direction: Floats) -> Fraction | float | None:
-    """The exact support by the rational simplex (inf where it is unbounded); None if that does not end."""
-    start = _exact_start(P)
-    if start is None:
-        return None
-    best = exact_maximum(P.A, P.b, P.program.flat, direction, start)
-    if best.status == "unbounded":
-        return np.inf
-    return Fraction(int(best.value.p), int(best.value.q)) if best.status == "optimal" else None
-
-
-def _exact_start(P: Rows) -> list[fmpq] | None:
-    if not affordable(*P.A.shape):
-        return None
-    start = exact_feasibility(P.A, P.b, P.program.flat, P.program.interior.point)
-    return start.point if start.status == "reached" else None
+def _by_simplex(program: Program, directions: Floats) -> list[Fraction]:
+    """Those with which the rational simplex ends."""
+    start = program.exact.feasible(program.interior.point) if program.exact.affordable else None
+    if start is None or start.status != "reached":
+        return []
+    best = [program.exact.maximum(row, start.point) for row in directions]
+    return [Fraction(int(outcome.value.p), int(outcome.value.q)) for outcome in best if outcome.status == "optimal"]

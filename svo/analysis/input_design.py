@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import cvxpy as cp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -278,8 +279,6 @@ class _Search:
 
     def _steepest(self, at: _Support) -> Array:
         """Inputs with the largest of the least affine bound, as far as the margin needs it."""
-        import cvxpy as cp
-
         deviation = cp.Variable(self._lower_piece.shape)
         bound = cp.Variable()
         limit = self._margin + max(self._margin, 0.1 * (self._margin - at.separation))
@@ -287,8 +286,6 @@ class _Search:
 
     def _cheapest(self, at: _Support) -> Array:
         """Inputs of least energy whose affine bounds reach the margin."""
-        import cvxpy as cp
-
         deviation = cp.Variable(self._lower_piece.shape)
         scale = np.sqrt(self._weight * self._pieces.sum(axis=0)[:, None])
         cost = cp.sum_squares(cp.multiply(scale, deviation))
@@ -296,15 +293,11 @@ class _Search:
 
     def _bounds(self, at: _Support, deviation: Any) -> Any:
         """The affine bounds (pairs,) as an expression of the pieces' deviations."""
-        import cvxpy as cp
-
         base = at.values + np.sum(at.slopes * (self._reference - at.u), axis=(1, 2))
         slopes = self._pieces.T @ at.slopes
         return cp.hstack([base[j] + cp.sum(cp.multiply(slopes[j], deviation)) for j in range(len(base))])
 
     def _optimum(self, objective: Any, rows: list[Any], deviation: Any) -> Array:
-        import cvxpy as cp
-
         problem = cp.Problem(objective, [*rows, deviation >= self._lower_piece, deviation <= self._upper_piece])
         problem.solve(solver=cp.CLARABEL)
         if deviation.value is None:

@@ -61,15 +61,10 @@ class LiftedSample:
         return [(self.known, self.stack[rows]), (self.p, gains[rows]), (self.rest, self.on_rest[rows])]
 
 
-def evaluate(model: UncertainModel, schedule: Any) -> tuple[Array, tuple[Channel, ...]]:
-    """The stack at a sample, Deltas of a single value added in, and the channels of the others."""
-    return evaluate_with_rest(model, schedule)[:2]
-
-
-def evaluate_with_rest(
+def evaluate(
     model: UncertainModel, schedule: Any, shift: tuple[Integers, Integers] | None = None
 ) -> tuple[Array, tuple[Channel, ...], Array]:
-    """`evaluate`, and what it leaves out.
+    """The stack at a sample, the channels of its uncertainties, and what the channels leave out.
 
     Parameters
     ----------

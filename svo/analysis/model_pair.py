@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
-from svo.analysis.lifted_rows import LiftedSample, evaluate_with_rest, line_rows, set_rows
+from svo.analysis.lifted_rows import LiftedSample, evaluate, line_rows, set_rows
 from svo.analysis.reachable_set import ReachableSet, product_bounds
 from svo.analysis.sparse_program import Columns, Solution, SparseProgram
 from svo.checks import Array, bounded_box, expect, finite_array, is_count
@@ -150,7 +150,7 @@ class _Side:
     def add(self, u: Columns, u_box: tuple[Array, Array], one: Columns, schedule: Any, last: bool) -> None:
         model, program = self.model, self._program
         lower, upper, noise = model.bounds(schedule)
-        stack, channels, left = evaluate_with_rest(model, schedule, self._shift)
+        stack, channels, left = evaluate(model, schedule, self._shift)
         w = program.columns(lower, upper)
         if model.disturbance_polytope is not None:
             set_rows(program, w, model.disturbance_polytope)

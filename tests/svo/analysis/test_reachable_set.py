@@ -16,7 +16,7 @@ def test_states_and_factors_of_any_run_lie_in_their_bounds(seed: int) -> None:
     model = random_plant(rng, largest=3)
     n = model.n_states
     lower, upper, _ = model.bounds()
-    stack, channels = evaluate(model, None)
+    stack, channels, _ = evaluate(model, None)
     reachable = ReachableSet(-np.ones(n), np.ones(n))
     x = rng.choice([-1.0, 1.0], n)
     w_ends = model.disturbance_polytope.vertices() if model.disturbance_polytope is not None else None
