@@ -37,6 +37,7 @@ from svo.cli.output import print_isolability, print_json
 
 
 @app.command()
+@one_line_errors()
 def distinguish(
     plant: PlantName,
     horizon: Annotated[int, typer.Option(min=1, help="Largest number of samples after the fault to search.")] = 100,
@@ -56,22 +57,22 @@ def distinguish(
     Example:
       svo distinguish eclipse --horizon 50 --noise quiet
     """
-    with one_line_errors():
-        from svo.analysis.isolability import isolability
-        from svo.cli.progress import progress
+    from svo.analysis.isolability import isolability
+    from svo.cli.progress import progress
 
-        the_plant = plant_to_simulate(plant)
-        noise = chosen_noise(the_plant, noise)
-        announce(PREPARING)
-        with progress("Pairs") as update:
-            answer = isolability(the_plant, noise, horizon, seed, progress=update, size=size)
-        if as_json:
-            print_json(answer.to_dict())
-        else:
-            print_isolability(answer)
+    the_plant = plant_to_simulate(plant)
+    noise = chosen_noise(the_plant, noise)
+    announce(PREPARING)
+    with progress("Pairs") as update:
+        answer = isolability(the_plant, noise, horizon, seed, progress=update, size=size)
+    if as_json:
+        print_json(answer.to_dict())
+    else:
+        print_isolability(answer)
 
 
 @app.command(name="design-input")
+@one_line_errors()
 def design_input(
     plant: PlantName,
     fault: Annotated[str, typer.Option(metavar="NAME", help="Fault to isolate.")],
@@ -100,24 +101,24 @@ def design_input(
     Example:
       svo design-input eclipse --fault elevator --size 0.3 --horizon 10 --hold 5 --noise conservative
     """
-    with one_line_errors():
-        from svo.analysis.plant_input import plant_input
+    from svo.analysis.plant_input import plant_input
 
-        the_plant = plant_to_simulate(plant)
-        noise = chosen_noise(the_plant, noise)
-        announce(PREPARING)
-        found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
-        if as_json:
-            print_json(found.to_dict())
-        else:
-            typer.echo(found.to_text())
-        if found.design.u is not None and out is not None:
-            found.write(out)
+    the_plant = plant_to_simulate(plant)
+    noise = chosen_noise(the_plant, noise)
+    announce(PREPARING)
+    found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        typer.echo(found.to_text())
+    if found.design.u is not None and out is not None:
+        found.write(out)
     if found.design.u is None:
         raise typer.Exit(1)
 
 
 @app.command()
+@one_line_errors(KEPT)
 def compare(
     plant: PlantName,
     out: Annotated[
@@ -161,39 +162,38 @@ def compare(
       svo compare eclipse --runs 50 --seed 0 --workers 2 --out comparison
       svo compare elevator --noise quiet --runs 20 --healthy-runs 50 --out comparison
     """
-    with one_line_errors(KEPT):
-        from dataclasses import replace
+    from dataclasses import replace
 
-        from svo.checks import expect_one_of
-        from svo.cli.progress import progress
-        from svo.studies.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
-        from svo.studies.comparison.publish import publish_comparison, to_text
+    from svo.checks import expect_one_of
+    from svo.cli.progress import progress
+    from svo.studies.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
+    from svo.studies.comparison.publish import publish_comparison, to_text
 
-        the_plant = plant_to_simulate(plant)
-        noise = chosen_noise(the_plant, noise)
-        for name in distribution or ():
-            expect_one_of("distribution", name, DISTRIBUTIONS)
-        chosen = tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS))
-        comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
-        if healthy_runs is not None:
-            comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
-        announce(PREPARING)
-        with progress("Parts") as update:
-            compared = run_comparison(
-                comparison,
-                workers,
-                update,
-                out=out,
-                scheduler=scheduler,
-                limit=own_processes(limit, scheduler, math.inf),
-                resume=resume,
-                retry_failed=retry_failed,
-            )
-        rows = publish_comparison(out, compared, the_plant)
-        if as_json:
-            print_json([row.to_dict() for row in rows])
-        else:
-            typer.echo(to_text(rows))
-            typer.echo(f"Table: {out / 'comparison.csv'}; picture: {out / 'comparison.png'}")
-        failed = compared.failures()
+    the_plant = plant_to_simulate(plant)
+    noise = chosen_noise(the_plant, noise)
+    for name in distribution or ():
+        expect_one_of("distribution", name, DISTRIBUTIONS)
+    chosen = tuple(d for d in DISTRIBUTIONS if d in (distribution or DISTRIBUTIONS))
+    comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
+    if healthy_runs is not None:
+        comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
+    announce(PREPARING)
+    with progress("Parts") as update:
+        compared = run_comparison(
+            comparison,
+            workers,
+            update,
+            out=out,
+            scheduler=scheduler,
+            limit=own_processes(limit, scheduler, math.inf),
+            resume=resume,
+            retry_failed=retry_failed,
+        )
+    rows = publish_comparison(out, compared, the_plant)
+    if as_json:
+        print_json([row.to_dict() for row in rows])
+    else:
+        typer.echo(to_text(rows))
+        typer.echo(f"Table: {out / 'comparison.csv'}; picture: {out / 'comparison.png'}")
+    failed = compared.failures()
     tell_failures(failed, "runs of detectors")

@@ -15,6 +15,7 @@ from svo.cli.output import print_detection, print_json, say
 
 
 @app.command()
+@one_line_errors()
 def detect(
     plant: DescribedName,
     log: LogFile,
@@ -39,42 +40,42 @@ def detect(
       svo detect eclipse log.csv --out findings
       svo detect my.toml log.mat --out findings
     """
-    with one_line_errors():
-        from svo.cli.progress import progress
-        from svo.detection.alarm_folder import check_no_results
-        from svo.detection.detect import detect as run_detection
-        from svo.detection.detect import write_detection
-        from svo.detection.thresholds import DetectsThresholds
-        from svo.plant import in_architecture
-        from svo.plant.description import check_kept_description, find_plant, keep_description
+    from svo.cli.progress import progress
+    from svo.detection.alarm_folder import check_no_results
+    from svo.detection.detect import detect as run_detection
+    from svo.detection.detect import write_detection
+    from svo.detection.thresholds import DetectsThresholds
+    from svo.plant import in_architecture
+    from svo.plant.description import check_kept_description, find_plant, keep_description
 
-        if out is not None:
-            check_no_results(out)
-        the_plant = in_architecture(find_plant(plant), architecture)
-        if out is not None:
-            check_kept_description(the_plant, out)
-        noise = chosen_noise(the_plant, noise)
-        samples = measured_log(log, the_plant)
-        # First, for it takes no time, and what it may refuse would cost the bank's answer.
-        crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
-        announce(PREPARING)
-        with progress("Samples") as update:
-            found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
-        beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
-        if out is not None:
-            write_detection(out, found, beside)
-            keep_description(the_plant, out)
-        if as_json:
-            print_json(found.to_dict() | beside)
-            return
-        print_detection(found)
-        if crossings is not None:
-            typer.echo(crossings.to_text())
-        if out is not None:
-            say(f"Alarms with certificates: {out / 'alarms.jsonl'}")
+    if out is not None:
+        check_no_results(out)
+    the_plant = in_architecture(find_plant(plant), architecture)
+    if out is not None:
+        check_kept_description(the_plant, out)
+    noise = chosen_noise(the_plant, noise)
+    samples = measured_log(log, the_plant)
+    # First, for it takes no time, and what it may refuse would cost the bank's answer.
+    crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
+    announce(PREPARING)
+    with progress("Samples") as update:
+        found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
+    beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
+    if out is not None:
+        write_detection(out, found, beside)
+        keep_description(the_plant, out)
+    if as_json:
+        print_json(found.to_dict() | beside)
+        return
+    print_detection(found)
+    if crossings is not None:
+        typer.echo(crossings.to_text())
+    if out is not None:
+        say(f"Alarms with certificates: {out / 'alarms.jsonl'}")
 
 
 @app.command()
+@one_line_errors()
 def watch(
     plant: DescribedName,
     log: Annotated[str, typer.Argument(metavar="LOG", help="CSV file that is being written, or - for standard input.")],
@@ -111,7 +112,7 @@ def watch(
       svo watch eclipse log.csv --out findings --state watch.state --silence 5
       logger | svo watch my.toml -
     """
-    with one_line_errors(), ExitStack() as stack:
+    with ExitStack() as stack:
         from functools import partial
 
         from svo.cli.output import console
@@ -151,6 +152,7 @@ def watch(
 
 
 @app.command()
+@one_line_errors()
 def calibrate(
     plant: DescribedName,
     log: LogFile,
@@ -166,16 +168,15 @@ def calibrate(
     Example:
       svo calibrate eclipse log.csv --noise quiet
     """
-    with one_line_errors():
-        from svo.detection.log_calibration import calibrate_log
-        from svo.plant.description import find_plant
+    from svo.detection.log_calibration import calibrate_log
+    from svo.plant.description import find_plant
 
-        the_plant = find_plant(plant)
-        noise = chosen_noise(the_plant, noise)
-        samples = measured_log(log, the_plant)
-        announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
-        found = calibrate_log(the_plant, samples, noise)
-        if as_json:
-            print_json(found.to_dict())
-        else:
-            typer.echo(found.to_text())
+    the_plant = find_plant(plant)
+    noise = chosen_noise(the_plant, noise)
+    samples = measured_log(log, the_plant)
+    announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
+    found = calibrate_log(the_plant, samples, noise)
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        typer.echo(found.to_text())

@@ -19,6 +19,7 @@ _WHY_EMPTY = "no model was falsified in what wrote it, or the file was cut off"
 
 
 @app.command()
+@one_line_errors()
 def verify(
     alarms: Annotated[
         Path, typer.Argument(metavar="ALARMS", help="An alarms.jsonl of `svo study`, `svo detect` or `svo watch`.")
@@ -44,20 +45,19 @@ def verify(
     Example:
       svo verify findings/alarms.jsonl --full log.csv
     """
-    with one_line_errors():
-        checks = _checks(alarms, log, full)
-        if not checks:
-            # Success would say that something was proven.
-            raise ValueError(f"{alarms} holds no alarm, so there is nothing to prove: {_WHY_EMPTY}")
-        if as_json:
-            print_json(
-                [
-                    {"line": c.line, "observer": c.observer, "sample": c.sample, "ok": c.ok, "reason": c.reason}
-                    for c in checks
-                ]
-            )
-        else:
-            print_checks(alarms, checks)
+    checks = _checks(alarms, log, full)
+    if not checks:
+        # Success would say that something was proven.
+        raise ValueError(f"{alarms} holds no alarm, so there is nothing to prove: {_WHY_EMPTY}")
+    if as_json:
+        print_json(
+            [
+                {"line": c.line, "observer": c.observer, "sample": c.sample, "ok": c.ok, "reason": c.reason}
+                for c in checks
+            ]
+        )
+    else:
+        print_checks(alarms, checks)
     if not all(check.ok for check in checks):
         raise typer.Exit(1)
 

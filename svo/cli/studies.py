@@ -36,6 +36,7 @@ _LIMIT = 3600.0  # s that a run may take, unless it is asked for
 
 
 @app.command()
+@one_line_errors()
 def plants(as_json: AsJson = False) -> None:
     """List the plants that are registered.
 
@@ -43,26 +44,26 @@ def plants(as_json: AsJson = False) -> None:
     Example:
       svo plants
     """
-    with one_line_errors():
-        from svo.plant import load_plant, registered_plants
+    from svo.plant import load_plant, registered_plants
 
-        every = []
-        for name in registered_plants():
-            try:
-                every.append(load_plant(name))
-            except (ImportError, TypeError) as error:  # one that is broken hides no other
-                typer.echo(f"note: {error}", err=True)
-        if as_json:
-            print_json([describe(plant) for plant in every])
-            return
-        for plant in every:
-            typer.echo(f"{plant.name}: {plant.title}")
-            for fault, profiles in plant.faults.items():
-                typer.echo(f"    fault {fault}: {', '.join(profiles)}")
-            typer.echo(f"    noise sets: {', '.join(plant.noise_sets)}; sampling time {plant.Ts:g} s")
+    every = []
+    for name in registered_plants():
+        try:
+            every.append(load_plant(name))
+        except (ImportError, TypeError) as error:  # one that is broken hides no other
+            typer.echo(f"note: {error}", err=True)
+    if as_json:
+        print_json([describe(plant) for plant in every])
+        return
+    for plant in every:
+        typer.echo(f"{plant.name}: {plant.title}")
+        for fault, profiles in plant.faults.items():
+            typer.echo(f"    fault {fault}: {', '.join(profiles)}")
+        typer.echo(f"    noise sets: {', '.join(plant.noise_sets)}; sampling time {plant.Ts:g} s")
 
 
 @app.command()
+@one_line_errors(KEPT)
 def study(
     plant: PlantName,
     out: Annotated[
@@ -111,40 +112,40 @@ def study(
       svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
       svo study elevator --runs 200 --seed 0 --out results
     """
-    with one_line_errors(KEPT):
-        _need_study_extra()
-        from svo.cli.progress import progress
-        from svo.studies.configuration import StudyConfiguration
-        from svo.studies.isolation.runner import run_study
-        from svo.studies.isolation.store import StudyFolder
-        from svo.studies.runs import all_failures
-        from svo.studies.thresholds import LearnsDetectors, run_detection_study
+    _need_study_extra()
+    from svo.cli.progress import progress
+    from svo.studies.configuration import StudyConfiguration
+    from svo.studies.isolation.runner import run_study
+    from svo.studies.isolation.store import StudyFolder
+    from svo.studies.runs import all_failures
+    from svo.studies.thresholds import LearnsDetectors, run_detection_study
 
-        the_plant = plant_to_simulate(plant)
-        configuration = StudyConfiguration.for_plant(
-            the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
-        )
-        for line in StudyFolder(out).check(configuration, resume):
-            note(line)
-        learns = isinstance(the_plant, LearnsDetectors)
-        run, show = (run_detection_study, _detector_study) if learns else (run_study, _isolation_study)
-        place: dict[str, Any] = {
-            "workers": workers,
-            "scheduler": scheduler,
-            "limit": own_processes(limit, scheduler, _LIMIT),
-        }
-        announce(PREPARING)
-        with progress("Runs") as update:
-            folder = run(configuration, out, resume=resume, retry_failed=retry_failed, progress=update, **place)
-        announce("Writing summary, pictures and report")
-        show(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
-        if not as_json:
-            typer.echo(f"Report: {out / 'report.html'}")
-        failed = all_failures(folder, the_plant)
+    the_plant = plant_to_simulate(plant)
+    configuration = StudyConfiguration.for_plant(
+        the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
+    )
+    for line in StudyFolder(out).check(configuration, resume):
+        note(line)
+    learns = isinstance(the_plant, LearnsDetectors)
+    run, show = (run_detection_study, _detector_study) if learns else (run_study, _isolation_study)
+    place: dict[str, Any] = {
+        "workers": workers,
+        "scheduler": scheduler,
+        "limit": own_processes(limit, scheduler, _LIMIT),
+    }
+    announce(PREPARING)
+    with progress("Runs") as update:
+        folder = run(configuration, out, resume=resume, retry_failed=retry_failed, progress=update, **place)
+    announce("Writing summary, pictures and report")
+    show(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
+    if not as_json:
+        typer.echo(f"Report: {out / 'report.html'}")
+    failed = all_failures(folder, the_plant)
     tell_failures(failed, "runs")
 
 
 @app.command()
+@one_line_errors()
 def report(
     folder: Annotated[
         Path,
@@ -162,26 +163,26 @@ def report(
     Example:
       svo report results
     """
-    with one_line_errors():
-        _need_study_extra()
-        from svo.plant import load_plant
-        from svo.studies.isolation.publish import publish
-        from svo.studies.isolation.store import StudyFolder
-        from svo.studies.thresholds import LearnsDetectors
-        from svo.studies.thresholds import publish as publish_detectors
+    _need_study_extra()
+    from svo.plant import load_plant
+    from svo.studies.isolation.publish import publish
+    from svo.studies.isolation.store import StudyFolder
+    from svo.studies.thresholds import LearnsDetectors
+    from svo.studies.thresholds import publish as publish_detectors
 
-        study = StudyFolder(folder)
-        the_plant = load_plant(study.identity()["configuration"]["plant"])
-        if isinstance(the_plant, LearnsDetectors):
-            publish_detectors(study, the_plant, without_damaged)
-        else:
-            publish(study, the_plant, without_damaged)
-        for line in study.notes():
-            note(line)
-        typer.echo(f"Report: {folder / 'report.html'}")
+    study = StudyFolder(folder)
+    the_plant = load_plant(study.identity()["configuration"]["plant"])
+    if isinstance(the_plant, LearnsDetectors):
+        publish_detectors(study, the_plant, without_damaged)
+    else:
+        publish(study, the_plant, without_damaged)
+    for line in study.notes():
+        note(line)
+    typer.echo(f"Report: {folder / 'report.html'}")
 
 
 @app.command()
+@one_line_errors()
 def simulate(
     plant: PlantName,
     out: Annotated[
@@ -200,27 +201,26 @@ def simulate(
     Example:
       svo simulate eclipse --fault elevator --profile step --noise quiet --seed 0 --out log.csv
     """
-    with one_line_errors():
-        from svo.logs.file import write_log
-        from svo.plant import HEALTHY, fault_start
-        from svo.studies.configuration import check_fault
+    from svo.logs.file import write_log
+    from svo.plant import HEALTHY, fault_start
+    from svo.studies.configuration import check_fault
 
-        the_plant = plant_to_simulate(plant)
-        noise = chosen_noise(the_plant, noise)
-        if fault == HEALTHY:
-            if profile not in (None, HEALTHY):
-                raise ValueError(
-                    f"profile {profile!r} is given without a fault; name one with --fault, or leave --profile out"
-                )
-            profile = HEALTHY
-        else:
-            check_fault(the_plant, fault, profile)
-            profile = profile or the_plant.faults[fault][0]
-        log = the_plant.simulate(fault, profile, noise, seed)
-        write_log(out, log, the_plant.columns)
-        start = fault_start(the_plant, fault, profile)
-        what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {start:g} s"
-        typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
+    the_plant = plant_to_simulate(plant)
+    noise = chosen_noise(the_plant, noise)
+    if fault == HEALTHY:
+        if profile not in (None, HEALTHY):
+            raise ValueError(
+                f"profile {profile!r} is given without a fault; name one with --fault, or leave --profile out"
+            )
+        profile = HEALTHY
+    else:
+        check_fault(the_plant, fault, profile)
+        profile = profile or the_plant.faults[fault][0]
+    log = the_plant.simulate(fault, profile, noise, seed)
+    write_log(out, log, the_plant.columns)
+    start = fault_start(the_plant, fault, profile)
+    what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {start:g} s"
+    typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
 
 
 def _isolation_study(folder: Any, plant: Any, json: dict[str, Any] | None) -> None:
