@@ -112,7 +112,9 @@ def study(
       svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
       svo study elevator --runs 200 --seed 0 --out results
     """
-    _need_study_extra()
+    from svo.checks import optional_import
+
+    optional_import("pyarrow", "study", "studies")  # first: what is imported next needs the extra too
     from svo.cli.progress import progress
     from svo.studies.configuration import StudyConfiguration
     from svo.studies.isolation.runner import run_study
@@ -140,8 +142,7 @@ def study(
     show(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
     if not as_json:
         typer.echo(f"Report: {out / 'report.html'}")
-    failed = all_failures(folder, the_plant)
-    tell_failures(failed, "runs")
+    tell_failures(all_failures(folder, the_plant), "runs")
 
 
 @app.command()
@@ -163,7 +164,9 @@ def report(
     Example:
       svo report results
     """
-    _need_study_extra()
+    from svo.checks import optional_import
+
+    optional_import("pyarrow", "study", "studies")  # first: what is imported next needs the extra too
     from svo.plant import load_plant
     from svo.studies.isolation.publish import publish
     from svo.studies.isolation.store import StudyFolder
@@ -242,12 +245,3 @@ def _detector_study(folder: Any, plant: Any, json: dict[str, Any] | None) -> Non
         print_detector_study(found)
     else:
         print_json({**json, **found.to_dict()})
-
-
-def _need_study_extra() -> None:
-    from importlib.util import find_spec
-
-    if find_spec("pyarrow") is None:
-        raise ValueError(
-            "svo study needs pyarrow, which is not installed; install the extra: pip install 'svo-fdi[study]'"
-        )
