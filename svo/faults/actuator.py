@@ -12,7 +12,6 @@ from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_one_of, finite_array, is_count, is_finite_number, positive_number
 from svo.faults.blocks import (
     channels,
-    check_channels,
     only_columns,
     product_of,
     sum_of_columns,
@@ -187,8 +186,7 @@ class ActuatorFault:
         array of the shape of u
         """
         commands = at_times("u", t, u)
-        where = channels(self.where)
-        check_channels(where, commands.shape[-1], "channels in u")
+        where = channels(self.where, commands.shape[-1], "channels in u")
         law = self.law(t)
         kept = self._held(t, commands, held)
         for channel in where:
@@ -223,7 +221,7 @@ class ActuatorFault:
         return nominal.in_given_time(self._model)
 
     def _model(self, nominal: UncertainModel) -> UncertainModel:
-        check_channels(channels(self.where), nominal.n_inputs, "inputs in the model")
+        channels(self.where, nominal.n_inputs, "inputs in the model")
         if self.kind in _NEEDS_TRAVEL:
             assert self.travel is not None
             return self._with_unknown_input(nominal, *self.travel, keep_command=False)

@@ -117,19 +117,15 @@ def product_of(
     return Uncertainty(**blocks, bounds=product_bounds(uncertainty.bounds, bounds), name=label)
 
 
-def channels(where: Any) -> tuple[int, ...]:
-    """``where`` of a fault as a tuple of indices, checked."""
+def channels(where: Any, count: int | None = None, what: str = "") -> tuple[int, ...]:
+    """``where`` of a fault as a tuple of indices, checked: below a count of what there is, if one is given."""
     indices = where if isinstance(where, tuple) else (where,)
     for index in indices:
         expect(is_count(index, 0), "where", where, "the index of a channel (>= 0) or a tuple of such indices")
     expect(indices and len(set(indices)) == len(indices), "where", where, "at least one channel, each once")
+    if count is not None and max(indices) >= count:
+        raise ValueError(f"where is {indices} but there are {count} {what}; expected indices below {count}")
     return tuple(int(i) for i in indices)
-
-
-def check_channels(where: Sequence[int], count: int, what: str) -> None:
-    """Refuse indices that the model or vector does not have."""
-    if max(where) >= count:
-        raise ValueError(f"where is {tuple(where)} but there are {count} {what}; expected indices below {count}")
 
 
 def _beside(left: Array, right: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from svo.checks import Array, expect_one_of, is_finite_number
-from svo.faults.blocks import channels, check_channels, mapped, only_columns, only_rows, product_of, with_noise
+from svo.faults.blocks import channels, mapped, only_columns, only_rows, product_of, with_noise
 from svo.faults.profiles import Profile, at_times, check_profile
 from svo.models import Schedulable, UncertainModel, Uncertainty
 
@@ -103,8 +103,7 @@ class SensorFault:
         array of the shape of y
         """
         readings = at_times("y", t, y)
-        where = channels(self.where)
-        check_channels(where, readings.shape[-1], "channels in y")
+        where = channels(self.where, readings.shape[-1], "channels in y")
         law = self.law(t)
         for channel in where:
             readings[..., channel] = law.gain * readings[..., channel] + law.offset
@@ -115,8 +114,7 @@ class SensorFault:
         return nominal.in_given_time(self._model)
 
     def _model(self, nominal: UncertainModel) -> UncertainModel:
-        where = channels(self.where)
-        check_channels(where, nominal.n_outputs, "outputs in the model")
+        channels(self.where, nominal.n_outputs, "outputs in the model")
         if self.kind in ("bias", "drift"):
             return nominal.replace(n=self._wider_noise(nominal, gain=1.0, offset=abs(self.magnitude)))
         uncertainties = [*nominal.uncertainties, self._scaling(nominal), *self._products(nominal)]
