@@ -4,77 +4,81 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= demo
 STUDY  := $(OUT)/eclipse
-PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+CORE   := $(wildcard core/*.* core/*/*.[ch] aircraft/*/*.[ch])
+
+# Where there is no C compiler, one from the package index builds what comes without a wheel.
+ifeq ($(origin CC)$(shell command -v cc || command -v gcc || command -v clang),default)
+ZIG := $(CURDIR)/$(BIN)/python -m ziglang cc
+endif
 
 # Modules are compiled when they are first imported (most never are), and kept.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test kernels test-slow test-browser test-packaging bench docs lint clean
+.PHONY: demo test test-slow test-browser test-packaging bench docs lint clean
 
 # The isolation-time study of the Eclipse with both noise sets, then a check of every alarm's proof.
-demo: $(VENV)/.study
+demo: $(VENV)/.study $(VENV)/.library
 	rm -rf $(STUDY)
 	$(BIN)/svo study eclipse --runs 10 --seed 0 --noise quiet --noise conservative --out $(STUDY)
 	$(BIN)/svo verify $(STUDY)/alarms.jsonl
 	@echo "Open $(STUDY)/report.html in a browser; everything else is beside it."
 
-# The kernels compile while the tests' own needs install and the linter runs; then the tests.
-test:
-	@$(MAKE) --no-print-directory --jobs=2 kernels lint
+test: lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-kernels: $(VENV)/.core
-	$(BIN)/python -m tests.compiled
-
 # The long checks, an hour of CPU in named groups (make test-slow GROUPS="soundness polytopes"); a stopped run goes on.
-test-slow: $(VENV)/.dev
+test-slow: $(VENV)/.dev $(VENV)/.library
 	$(BIN)/python -m tests.slow $(GROUPS)
 
 # The report of a study in headless Chromium or Chrome; skipped, with the reason, where there is none.
-test-browser: $(VENV)/.dev
+test-browser: $(VENV)/.dev $(VENV)/.library
 	$(BIN)/python -m pytest -m browser -rs
 
 # Wheel and source archive: built, installed into an empty environment, used from outside this folder.
-test-packaging: $(VENV)/.dev
+test-packaging: $(VENV)/.dev $(VENV)/.library
 	$(BIN)/python -m pytest -m packaging -rs
 
-bench: $(VENV)/.dev
+bench: $(VENV)/.dev $(VENV)/.library
 	$(BIN)/python -m benchmarks
 
 # The documentation site, offline; a broken link or reference is an error.
-docs: $(VENV)/.docs
+docs: $(VENV)/.docs $(VENV)/.library
 	$(BIN)/python -m sphinx -q -W --keep-going -aE -b html docs docs/_build/html
 	@echo "Open docs/_build/html/index.html in a browser."
 
-lint: $(VENV)/.dev
+lint: $(VENV)/.dev $(VENV)/.library
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) $(STUDY) docs/_build docs/_copied build *.egg-info
+	rm -rf $(VENV) $(STUDY) docs/_build docs/_copied build *.egg-info polytopes/_core.*
+	-git clean -qXfd core
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "Python 3.11 or later is needed; name one: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.core: pyproject.toml | $(BIN)/python
-	@echo "Installing the toolbox into $(VENV) (about a minute)"
-	$(PIP) .
+# The core is built by each installation, and again when a file of it was edited.
+$(VENV)/.library: $(CORE) | $(BIN)/python
+	$(PIP) --no-deps --editable .
 	@touch $@
 
 $(VENV)/.study: pyproject.toml | $(BIN)/python
 	@echo "Installing what the study needs into $(VENV) (about a minute)"
-	$(PIP) '.[study]'
-	@touch $@
+	$(PIP) --editable '.[study]'
+	@touch $@ $(VENV)/.library
 
-$(VENV)/.dev: $(VENV)/.core
+$(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing what the tests need into $(VENV) (about a minute)"
-	@$(PIP) '.[study,cluster,compare,dev,cdd]' || { \
-	  echo "No pycddlib for this machine: its tests will be skipped"; $(PIP) '.[study,cluster,compare,dev]'; }
-	@touch $@ $(VENV)/.study
+	$(PIP) --editable '.[study,cluster,compare,dev]'
+	@$(if $(ZIG),$(PIP) ziglang)
+	@$(if $(ZIG),CC="$(ZIG)") $(PIP) --editable '.[cdd]' || \
+	  echo "No pycddlib for this machine: its tests will be skipped"
+	@touch $@ $(VENV)/.study $(VENV)/.library
 
 $(VENV)/.docs: pyproject.toml | $(BIN)/python
 	@echo "Installing what the documentation needs into $(VENV) (about a minute)"
-	$(PIP) '.[study,docs]'
-	@touch $@
+	$(PIP) --editable '.[study,docs]'
+	@touch $@ $(VENV)/.library

@@ -1,0 +1,2 @@
+#include "core.h"
+EXPORTED double core_unit(void) { return UNIT; }
