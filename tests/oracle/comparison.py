@@ -1,0 +1,56 @@
+"""Answers of two cores to the same questions: where they differ, and by how much of a set's width."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.oracle.cases import Answers
+
+SINGLE, CHAINED = 1e-9, 1e-6  # of the width of a box: rounding of one program, and what a log makes of it
+LIMITS = {"program": SINGLE, "chain": CHAINED, "flight": CHAINED, "polytope": SINGLE}
+
+
+class Difference(NamedTuple):
+    """Of one question: what differs, or None; and how far the bounds are apart, as a share of the width."""
+
+    what: str | None
+    apart: float
+
+
+def difference(kind: str, old: Answers, new: Answers) -> Difference:
+    """Of the answers to one question; bounds may be narrower, by however much."""
+    if old.keys() != new.keys():
+        return Difference(f"answers {sorted(new)} instead of {sorted(old)}", np.inf)
+    worst = 0.0
+    for name, before in old.items():
+        after = new[name]
+        if before.shape != after.shape or before.dtype.kind != after.dtype.kind:
+            return Difference(f"{name} has another shape or type: {after} instead of {before}", np.inf)
+        if before.dtype.kind != "f" or name.endswith("facets"):
+            if not np.array_equal(before, after):
+                return Difference(f"{name}: {after} instead of {before}", np.inf)
+        else:
+            worst = max(worst, _apart(before, after, old, name))
+    return Difference(f"bounds are {worst:.2g} of the width apart" if worst > LIMITS[kind] else None, worst)
+
+
+def _apart(before: NDArray, after: NDArray, answers: Answers, name: str) -> float:
+    """How much wider the new bounds are, as a share of the width."""
+    if before.size == 0:
+        return 0.0
+    if not np.array_equal(np.isfinite(before), np.isfinite(after)):
+        return np.inf
+    known = np.isfinite(before)
+    if "box" in name or name == "shadow":
+        width = np.abs(np.subtract(before[..., 1, :], before[..., 0, :], where=known[..., 0, :] & known[..., 1, :],
+                                   out=np.ones(before[..., 0, :].shape)))  # fmt: skip
+        outward = np.stack([before[..., 0, :] - after[..., 0, :], after[..., 1, :] - before[..., 1, :]], axis=-2)
+        scale = np.stack([width, width], axis=-2)
+    else:
+        outward, scale = after - before, np.maximum(1.0, np.abs(before))
+    size = scale + 1e-3 * np.abs(np.where(known, before, 0.0))  # rounding is relative to size, not width
+    shares = np.divide(outward, size, where=known & (size > 0.0), out=np.zeros(before.shape))
+    return float(max(shares.max(), 0.0))
