@@ -8,8 +8,8 @@ from functools import cache
 from typing import get_args
 
 import numpy as np
+import scipy  # its parts load when they are used: detection needs no filter design
 from numpy.typing import ArrayLike
-from scipy.signal import butter, sosfilt
 
 from svo.checks import Array, expect, expect_one_of
 from svo.plant import Distribution
@@ -71,7 +71,7 @@ class BandLimitedNoise:
         # The variance of a uniform variable on [-1, 1] is 1/3.
         coloured = rng.uniform(-1.0, 1.0, shape) if bounded else rng.standard_normal(shape) / np.sqrt(3.0)
         for column, (sections, _, _) in zip(coloured.T, filters, strict=True):
-            column[:] = sosfilt(sections, column)
+            column[:] = scipy.signal.sosfilt(sections, column)
         gains = np.array([gain for _, _, gain in filters])
         bounds = np.asarray(self.bounds)
         noise: Array = coloured[settling:] * (RMS_PER_BOUND * bounds / gains)
@@ -81,8 +81,8 @@ class BandLimitedNoise:
 @cache
 def _low_pass(cutoff: float, Ts: float) -> tuple[Array, int, float]:
     """Filter sections, samples until it has settled, and the rms of its output for uniform noise on [-1, 1]."""
-    sections = butter(2, cutoff, fs=1 / Ts, output="sos")
+    sections = scipy.signal.butter(2, cutoff, fs=1 / Ts, output="sos")
     settling = int(np.ceil(_SETTLING_PERIODS / (cutoff * Ts)))
     impulse = np.zeros(settling)
     impulse[0] = 1.0
-    return sections, settling, float(np.sqrt(np.sum(sosfilt(sections, impulse) ** 2) / 3))
+    return sections, settling, float(np.sqrt(np.sum(scipy.signal.sosfilt(sections, impulse) ** 2) / 3))

@@ -12,13 +12,14 @@ from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
 from polytopes.linear_program import Program, prepare
 from polytopes.minkowski_weyl import ExactGenerators
+from polytopes.value import Value
 
 Table = tuple[Floats, Floats, Floats, Floats]
 """Rows A, b, C, d: what the operations hand to the constructor of a set."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rows:
+class Rows(Value):
     """``{x : A x <= b, C x = d}`` as read-only float arrays.
 
     Parameters
@@ -51,6 +52,9 @@ class Rows:
         for name, array in zip("AbCd", (rows, rhs, fixed, values), strict=True):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+
+    def __reduce__(self) -> tuple[type[Self], Table]:
+        return type(self), (self.A, self.b, self.C, self.d)  # what is derived from them is derived again
 
     @property
     def dim(self) -> int:

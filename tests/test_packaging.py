@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
 import venv
 import zipfile
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
+
+from polytopes.native import PATH
+from tests.core.disassembly import fused_instructions
 
 pytestmark = pytest.mark.packaging
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("aircraft", "polytopes", "svo")
 EXAMPLES = ROOT / "docs" / "examples"
+LIBRARY = PATH.name
+COMPILERS = ("cc", "c89*", "c99*", "*gcc*", "*g++*", "c++", "clang*", "tcc")
 
 TYPED = """
 from polytopes import HPolytope
@@ -29,8 +37,8 @@ wrong: int = HPolytope.box([-1.0], [1.0]).emptiness().status
 """
 
 
-def run(*command: str | Path, cwd: Path) -> str:
-    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True)
+def run(*command: str | Path, cwd: Path, env: dict[str, str] | None = None) -> str:
+    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True, env=env)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -44,23 +52,38 @@ def archives(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
-def installed(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Programs of a new environment that has the wheel and what it asks for, and nothing else."""
+def no_compiler(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """This environment without a C compiler: a PATH of links to every program but those, and no CC."""
+    programs = tmp_path_factory.mktemp("programs")
+    for folder in map(Path, os.environ["PATH"].split(os.pathsep)):
+        for program in folder.iterdir() if folder.is_dir() else ():
+            link = programs / program.name
+            if not any(fnmatch(program.name, pattern) for pattern in COMPILERS) and not link.is_symlink():
+                link.symlink_to(program)
+    return {name: value for name, value in os.environ.items() if name != "CC"} | {"PATH": str(programs)}
+
+
+@pytest.fixture(scope="module")
+def installed(
+    archives: tuple[Path, Path], no_compiler: dict[str, str], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """Programs of a new environment that has the wheel and what it asks for, installed where there is no compiler."""
     home = tmp_path_factory.mktemp("fresh")
     venv.create(home / "venv", with_pip=True)
     programs = home / "venv" / ("Scripts" if sys.platform == "win32" else "bin")
-    run(programs / "python", "-m", "pip", "install", "--quiet", archives[1], cwd=home)
+    run(programs / "python", "-m", "pip", "install", "--quiet", archives[1], cwd=home, env=no_compiler)
     return programs
 
 
-def shipped() -> set[str]:
+def kept() -> set[str]:
     """Every file of the packages that the repository keeps."""
     return set(run("git", "ls-files", *PACKAGES, cwd=ROOT).split())
 
 
-def test_the_wheel_has_every_file_of_the_packages_and_nothing_else(archives: tuple[Path, Path]) -> None:
+def test_the_wheel_has_every_file_of_the_packages_the_library_and_nothing_else(archives: tuple[Path, Path]) -> None:
     names = {n for n in zipfile.ZipFile(archives[1]).namelist() if ".dist-info/" not in n}
-    assert names == shipped()
+    sources = {name for name in kept() if name.endswith((".c", ".h"))}
+    assert names == kept() - sources | {f"polytopes/{LIBRARY}"}
     page = {f"svo/studies/pages/{name}" for name in ("report.js", "report.css", "page.html.j2")}
     assert page | {f"{p}/py.typed" for p in PACKAGES} <= names
 
@@ -68,7 +91,42 @@ def test_the_wheel_has_every_file_of_the_packages_and_nothing_else(archives: tup
 def test_the_source_archive_builds_by_itself(archives: tuple[Path, Path]) -> None:
     with tarfile.open(archives[0]) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
-    assert shipped() | {"README.md", "LICENSE", "pyproject.toml"} <= names
+    core = set(run("git", "ls-files", "core", cwd=ROOT).split())
+    assert kept() | core | {"README.md", "LICENSE", "pyproject.toml"} <= names
+
+
+def test_one_wheel_serves_all_pythons_of_a_platform(archives: tuple[Path, Path]) -> None:
+    assert "-py3-none-" in archives[1].name
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="auditwheel checks wheels for Linux")
+def test_the_wheel_asks_for_no_library_that_a_machine_may_lack(archives: tuple[Path, Path]) -> None:
+    assert "manylinux" in run(sys.executable, "-m", "auditwheel", "show", archives[1], cwd=ROOT)
+
+
+def test_without_a_compiler_the_package_index_gives_one(no_compiler: dict[str, str], tmp_path: Path) -> None:
+    for name in ("cc", "gcc", "clang", "c99", "tcc"):
+        assert shutil.which(name, path=no_compiler["PATH"]) is None
+    home = tmp_path / "clone"
+    run("git", "clone", "--quiet", ROOT, home, cwd=tmp_path)
+    run(sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path, home, cwd=tmp_path, env=no_compiler)
+    with zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as wheel:
+        library = Path(wheel.extract(f"polytopes/{LIBRARY}", tmp_path))
+    assert not fused_instructions(library)
+    assert ctypes.CDLL(str(library)).fdi_window_bytes
+
+
+def test_an_edited_file_of_the_core_is_built_by_the_next_make(tmp_path: Path) -> None:
+    home = tmp_path / "clone"
+    run("git", "clone", "--quiet", ROOT, home, cwd=tmp_path)
+    run("make", ".venv/.library", cwd=home)
+    library = home / "polytopes" / LIBRARY
+    before = library.stat().st_mtime_ns
+    assert "up to date" in run("make", ".venv/.library", cwd=home)
+    header = home / "core" / "core.h"
+    header.write_text(header.read_text("utf-8") + "/* edited */\n", encoding="utf-8")
+    run("make", ".venv/.library", cwd=home)
+    assert library.stat().st_mtime_ns > before
 
 
 def test_two_builds_of_one_source_are_equal(tmp_path: Path) -> None:

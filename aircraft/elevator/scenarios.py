@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+import scipy  # its parts load when they are used
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from svo.checks import Array
 from svo.faults import ActuatorFault, Ramp, Step
@@ -69,7 +69,7 @@ class SensorNoise:
         """A stationary realisation, (samples,)."""
         innovations = self.sigma * np.sqrt(1 - self.correlation**2) * rng.normal(size=samples)
         before = self.sigma * rng.normal()
-        noise = lfilter([1.0], [1.0, -self.correlation], innovations, zi=[self.correlation * before])[0]
+        noise = scipy.signal.lfilter([1.0], [1.0, -self.correlation], innovations, zi=[self.correlation * before])[0]
         return np.clip(noise, -self.bound, self.bound)
 
 

@@ -244,6 +244,13 @@ class Bank(ABC):
             recorder.add(verdict)
         return recorder.record()
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "observers": dict(self.observers)}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.observers = MappingProxyType(self.observers)
+
     # -- what the architectures add ----------------------------------------------------------------
 
     @abstractmethod

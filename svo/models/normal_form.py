@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.value import Value
 from svo.checks import Array
 from svo.models.bounds import Bounds
 from svo.models.stack import Stack
@@ -180,7 +181,7 @@ def lengthened(rows: Array, unit: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _ScaledStack:
+class _ScaledStack(Value):
     """A stack that is evaluated in the given units, where its errors speak of the user's numbers."""
 
     given: Stack

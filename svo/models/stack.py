@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.value import Value
 from svo.checks import Array, finite_array, floats
 from svo.models.schedule_table import ScheduleTable, values_over
 
@@ -92,7 +93,7 @@ class ScheduledBlock:
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
+class Stack(Value):
     """Constant blocks (1 + n_uncertainties, n + ny, n + nu + 1 + nw), zero where the scheduled ones stand."""
 
     layout: Layout

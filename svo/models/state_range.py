@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.value import Value
 from svo.checks import Array, expect, real_array
 
 _EPS = float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False)
-class StateRange:
+class StateRange(Value):
     """{x : lower <= x <= upper}; an infinite bound says nothing.
 
     Attributes

@@ -6,14 +6,8 @@ front of each reason is the point of the list of faults found by use.
 
 from __future__ import annotations
 
-import copy
-import pickle
-import subprocess
-import sys
-
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
 
 import svo
 from polytopes import HPolytope
@@ -59,31 +53,6 @@ def test_a_longer_window_is_not_wider() -> None:
     assert width[10] <= width[5] * (1.0 + 1e-6)
 
 
-@later("B3", (TypeError, ValueError, AttributeError), "a set that was asked something cannot be pickled")
-def test_a_set_that_was_asked_something_can_be_pickled() -> None:
-    P = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
-    P.emptiness(), P.support([1.0, 0.0]), P.vertices()
-    assert pickle.loads(pickle.dumps(P)).contains([0.5, 0.5])
-
-
-@later("B3", TypingError, "observers cannot be copied")
-def test_an_observer_can_be_copied() -> None:
-    observer = cart_observer()
-    observer.update([0.0])
-    assert copy.deepcopy(observer).step([1.0], [0.0]).verdict == observer.step([1.0], [0.0]).verdict
-
-
-@later("B3", (TypeError, ValueError, AttributeError), "steps cannot be pickled")
-def test_a_step_can_be_pickled() -> None:
-    assert pickle.loads(pickle.dumps(cart_observer().update([0.0]))).verdict == "consistent"
-
-
-@later("B3", FAILED, "arrays of a copied set are writeable")
-def test_the_arrays_of_a_copied_set_are_read_only() -> None:
-    with pytest.raises(ValueError, match="read-only"):
-        copy.deepcopy(HPolytope.box([-1.0], [1.0])).A[0, 0] = 5.0
-
-
 # -- the face --------------------------------------------------------------------------------------------------------
 
 
@@ -116,11 +85,3 @@ def test_a_record_prints_a_line() -> None:
 def test_no_fault_is_called_global() -> None:
     with pytest.raises(ValueError, match="global"):
         ArchitectureI(cart_observer(), {"global": cart_observer()})
-
-
-@later("C", AssertionError, "listing the plants imports scipy.signal")
-def test_listing_the_plants_imports_no_scipy_signal() -> None:
-    list_plants = "import sys; from svo.cli import app; app(['plants'], standalone_mode=False)"
-    code = f"{list_plants}; print('scipy.signal' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "False"

@@ -65,9 +65,16 @@ def test_the_module_is_the_command(registered_tank: str) -> None:
 
 
 def test_start_up_imports_nothing_heavy() -> None:
-    heavy = ("numba", "scipy", "matplotlib", "pyarrow", "flint")
+    heavy = ("scipy", "matplotlib", "pyarrow", "flint")
     code = f"import sys, svo.cli; print([name for name in {heavy} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_listing_the_plants_imports_no_scipy_signal() -> None:
+    list_plants = "import sys; from svo.cli import app; app(['plants'], standalone_mode=False)"
+    code = f"{list_plants}; print('scipy.signal' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"
 
 
 def test_a_log_is_detected_on_and_its_alarms_are_verified(log: Path, tmp_path: Path) -> None:
