@@ -1,8 +1,8 @@
 """The native core against the last commit with Numba: the same tasks in turns, in one run, as ratios.
 
-Run with ``python -m benchmarks.native``. The tagged commit is installed beside, in an environment of its own under
-``build/numba`` (once, with pip), and both interpreters do one turn of a task after the other; what counts is the median
-of the ratios of neighbouring turns, and the CPU microseconds of both. ``--turns`` says how many, ``--only`` which tasks.
+Run with ``python -m benchmarks.native``. The tagged commit is installed beside (once, with pip), in an environment of
+its own, and both interpreters do one turn of a task after the other; what counts is the median of the ratios of
+neighbouring turns, and the CPU microseconds of both. ``--turns`` says how many, ``--only`` which tasks.
 """
 
 from __future__ import annotations

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
-from svo.isolation import Alarm, BankRecord, Recorder, write_alarms
+from svo.isolation import Alarm, BankRecord, write_alarms
 from svo.logs.columns import check_times
-from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models import model_digest
 from svo.observers.base import Certificate, Observer
@@ -131,14 +129,10 @@ def detect(
         For an unknown noise set, and for a log without samples, with other channels, or of another sampling time.
     """
     check_log(plant, log)
-    bank = plant.bank(noise)
-    bank.warm_up()  # no sample waits for a compiler
-    recorder = Recorder(bank.names, len(log))
-    for verdict in drive(bank, log, scheduler=partial(schedule_of, plant.scheduler())):
-        recorder.add(verdict)
-        if progress is not None:
-            progress(verdict.sample + 1, len(log))
-    record = recorder.record()
+    bank, scheduler = plant.bank(noise), plant.scheduler()
+    schedule = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
+    known = None if schedule[0] is None else np.array(schedule)
+    record = bank.run(replace(log, schedule=known), progress=progress)
     origin = {**source_of_bank(plant), "noise": noise, **(source or {})}
     return Detection(plant.name, noise, log.time, record, alarms_of(record, log, origin, bank.observers))
 

@@ -79,6 +79,10 @@ class ArchitectureI(Bank):
         super()._forget()
         self._hull: Box | None = None
 
+    @property
+    def _may_start_again(self) -> bool:
+        return self._logic.may_restart
+
     def _memory(self) -> dict[str, Array]:
         return {} if self._hull is None else {"hull": np.array(self._hull)}
 

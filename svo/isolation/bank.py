@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from time import perf_counter
 from types import MappingProxyType
@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_kind, expect_shape, is_count, is_finite_number
 from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import BankState, Sample, restored, saved
+from svo.isolation.front import Front
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Recorder, Verdict
 from svo.logs.drive import drive
-from svo.logs.log import Log
+from svo.logs.log import Log, expect_log
 from svo.observers.base import Observer, Step
 
 
@@ -230,18 +232,28 @@ class Bank(ABC):
         """Compile whatever the observers' steps need; returns the seconds that it took."""
         return sum(observer.warm_up() for observer in self.observers.values())
 
-    def run(self, log: Log) -> BankRecord:
+    @options_by_name
+    def run(self, log: Log, *, progress: Callable[[int, int], None] | None = None) -> BankRecord:
         """All samples of a log, with its own schedule.
+
+        Parameters
+        ----------
+        log : Log
+        progress : callable, optional
+            Called with (samples done, samples in all) as they are done.
 
         Raises
         ------
         ValueError
             If the bank has already started, or the log is empty or has other channels than the models.
         """
+        expect_log(log)
         self._check_log(log)
         recorder = Recorder(self.names, len(log))
-        for verdict in drive(self, log):
-            recorder.add(verdict)
+        for verdict, samples in self._follow(log):
+            recorder.add(verdict, samples)
+            if progress is not None:
+                progress(verdict.sample + 1, len(log))
         return recorder.record()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -267,7 +279,28 @@ class Bank(ABC):
     def _recall(self, arrays: Mapping[str, NDArray[np.float64]]) -> None:
         """Take back what `_memory` gave."""
 
+    @property
+    def _may_start_again(self) -> bool:
+        """Whether an observer may be started during a run, from the sets that others have at that sample."""
+        return True
+
     # -- inside ------------------------------------------------------------------------------------
+
+    def _follow(self, log: Log) -> Iterator[tuple[Verdict, int]]:
+        """The verdicts over a log, each with the samples that it is of: many where nothing changes."""
+        if self._may_start_again:
+            yield from ((verdict, 1) for verdict in drive(self, log))
+            return
+        fronts = {name: Front(name, observer.follow(log)) for name, observer in self._running.items()}
+        k = 0
+        while k < len(log):
+            running = [fronts[name] for name in self._running]
+            count = min((front.plain() for front in running), default=len(log) - k)
+            count = max(count, 1)
+            k += count
+            steps = {front.name: front.take(count) for front in running}
+            now = Sample.given(log.u[k - 2] if k > 1 else None, log.y[k - 1], log.u[k - 1], log.schedule_at(k - 1))
+            yield self._conclude(k - 1, steps, now), count
 
     def _timed_steps(self, now: Sample, deadline: float) -> dict[str, Step]:
         if not (is_finite_number(deadline) and deadline > 0):

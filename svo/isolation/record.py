@@ -99,16 +99,17 @@ class Recorder:
         self._fault: str | None = None
         self._global_seconds: NDArray[np.float64] | None = None
 
-    def add(self, verdict: Verdict) -> None:
-        """The next sample."""
+    def add(self, verdict: Verdict, samples: int = 1) -> None:
+        """The next sample; or the next ``samples``, of whose last the verdict is and at which nothing changed."""
         k = verdict.sample
-        self._states.append(verdict.state)
+        rows = slice(k + 1 - samples, k + 1)
+        self._states += [verdict.state] * samples
         for i, name in enumerate(self._names):
             step = verdict.steps.get(name)
-            self._alive[k, i] = name in verdict.alive
+            self._alive[rows, i] = name in verdict.alive
             if step is not None:
-                self._seconds[k, i] = step.seconds
-                self._undecided[k, i] = step.verdict == "undecided"
+                self._seconds[rows, i] = step.seconds
+                self._undecided[rows, i] = step.verdict == "undecided"
                 if self._died_at[name] is None and not self._alive[k, i]:
                     self._died_at[name], self._certificates[name] = k, step.certificate
         if GLOBAL in verdict.steps:

@@ -75,6 +75,10 @@ def drive(
     """
     expect_log(log)
     for k in range(start, len(log)):
-        held, y, u = log.u[k - 1] if k else None, log.y[k], log.u[k]
-        schedule = log.schedule_at(k) if scheduler is None else scheduler(y, u)
-        yield advance(driven, held, y, u, schedule, **options)
+        schedule = log.schedule_at(k) if scheduler is None else scheduler(log.y[k], log.u[k])
+        yield advance_to(driven, log, k, schedule, **options)
+
+
+def advance_to(driven: Driven[Answer], log: Log, k: int, schedule: Any, **options: Any) -> Answer:
+    """The answer at sample k of a log."""
+    return advance(driven, log.u[k - 1] if k else None, log.y[k], log.u[k], schedule, **options)

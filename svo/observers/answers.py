@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -99,6 +99,20 @@ def between(rows: Array, lower: Array, upper: Array) -> HPolytope:
     bounds = np.concatenate([upper, -lower])
     known = np.isfinite(bounds)
     return HPolytope(np.vstack([rows, -rows])[known], bounds[known])
+
+
+class Seen(NamedTuple):
+    """Samples of a log that an observer has just seen: one, or many at once that are all consistent.
+
+    Attributes
+    ----------
+    samples : int
+    step : Step
+        The answer at the last of them; its ``seconds`` are those of each, on average.
+    """
+
+    samples: int
+    step: Step
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ underscore and are given what has been checked.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from time import perf_counter
 from typing import Any, ClassVar, Self
@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from svo.checks import Array, is_count
 from svo.logs.drive import drive
-from svo.logs.log import Log
+from svo.logs.log import Log, expect_log
 from svo.models import UncertainModel, expect_model
-from svo.observers.answers import Record, Step, VerdictName
+from svo.observers.answers import Record, Seen, Step, VerdictName
 from svo.observers.certificate import Certificate
 from svo.observers.data import (
     check_may_start_by_step,
@@ -32,7 +32,7 @@ from svo.observers.data import (
 from svo.observers.first_states import first_box
 from svo.observers.saved_state import State, check_model, check_unchanged, last_schedule, sealed
 
-__all__ = ["Certificate", "Observer", "Record", "Step", "VerdictName"]
+__all__ = ["Certificate", "Observer", "Record", "Seen", "Step", "VerdictName"]
 
 _UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, RecursionError)  # by arrays that fit no observer
 
@@ -196,13 +196,35 @@ class Observer(ABC):
         TypeError, ValueError
             As `update` and `step`; if the log is no `svo.Log`, has no samples, or the observer has started already.
         """
-        steps, boxes = [], []
-        for step in drive(self, log):
-            steps.append(step)
-            boxes.append(step.box)  # it is that of the newest sample only
-        lower, upper = (np.array(ends) for ends in zip(*boxes, strict=True))
-        seconds = np.array([s.seconds for s in steps])
-        return Record(tuple(s.verdict for s in steps), lower, upper, seconds, steps[-1].certificate)
+        expect_log(log)
+        boxes = np.empty((len(log), 2, self.model.n_states))
+        verdicts: list[VerdictName] = []
+        seconds: list[float] = []
+        for samples, step in self.follow(log, boxes):
+            verdicts += [step.verdict] * samples
+            seconds += [step.seconds] * samples
+        return Record(tuple(verdicts), boxes[:, 0], boxes[:, 1], np.array(seconds), step.certificate)
+
+    def follow(self, log: Log, boxes: Array | None = None) -> Iterator[Seen]:
+        """The samples of a log as they are seen: one after the other, or many consistent ones at once.
+
+        Who has seen enough stops asking. An observer that takes many samples at once has then seen more of the log.
+
+        Parameters
+        ----------
+        log : Log
+        boxes : (K, 2, n) array, optional
+            Filled with lower and upper bounds of the state at each sample, which are computed only then.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As `run`.
+        """
+        for k, step in enumerate(drive(self, log)):
+            if boxes is not None:
+                boxes[k] = step.box  # it is that of the newest sample only
+            yield Seen(1, step)
 
     def warm_up(self) -> float:
         """Load and compile whatever a step can need, without touching this observer; returns the seconds it took."""

@@ -1,4 +1,4 @@
-"""The compiled core as a library: no fused instruction, nothing exported but its own, a clear word where it is missing."""
+"""The compiled core as a library: no fused instruction, a clear word where it is missing, a quick start."""
 
 from __future__ import annotations
 

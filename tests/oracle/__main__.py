@@ -38,8 +38,8 @@ def compare(old: Recording, new: Recording) -> int:
         samples = sum(a.size for key in keys for name, a in old[key].items() if name.endswith("verdicts"))
         bounds = sum(a.size for key in keys for a in old[key].values() if a.dtype.kind == "f")
         print(
-            f"{kind}: {len(keys)} questions, {samples} samples, {bounds} bounds; {len(wrong)} differ; the others are at "
-            f"most {max(shares, default=0.0):.2g} of a width wider, median {np.median(shares or [0.0]):.2g}"
+            f"{kind}: {len(keys)} questions, {samples} samples, {bounds} bounds; {len(wrong)} differ; the others are "
+            f"at most {max(shares, default=0.0):.2g} of a width wider, median {np.median(shares or [0.0]):.2g}"
         )
         for (_, seed), d in list(wrong.items())[:20]:
             print(f"  seed {seed}: {d.what}")

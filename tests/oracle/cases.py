@@ -58,7 +58,8 @@ def flight(seed: int) -> Answers:
     found: Answers = {}
     for name, observer in plant.bank(noise).observers.items():
         if isinstance(observer, WindowObserver):
-            found |= {f"{name}.{key}": value for key, value in _followed(observer, log, 50, partial(schedule_of, plant.scheduler())).items()}
+            answers = _followed(observer, log, 50, partial(schedule_of, plant.scheduler()))
+            found |= {f"{name}.{key}": value for key, value in answers.items()}
     return found
 
 
@@ -89,7 +90,9 @@ def polytope(seed: int) -> Answers:
     return found
 
 
-KINDS: dict[str, Callable[[int], Answers]] = {"program": program, "chain": chain, "flight": flight, "polytope": polytope}
+KINDS: dict[str, Callable[[int], Answers]] = {
+    "program": program, "chain": chain, "flight": flight, "polytope": polytope,
+}  # fmt: skip
 
 
 def _start(model: UncertainModel) -> HPolytope:

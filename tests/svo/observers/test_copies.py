@@ -1,4 +1,4 @@
-"""Sets, observers, their steps and banks: pickled, deep-copied, in another process; what never changes still does not."""
+"""Sets, observers, their steps and banks: pickled, deep-copied, in another process; values still never change."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ LOG.y[30:] += 2.0
 
 
 def bank(architecture: str) -> Any:
-    faults = {"drive": WindowObserver(CART.replace(w=[0.4]), START), "gauge": WindowObserver(CART.replace(n=[3.0]), START)}
+    others = {"drive": CART.replace(w=[0.4]), "gauge": CART.replace(n=[3.0])}
+    faults = {name: WindowObserver(model, START) for name, model in others.items()}
     if architecture == "I":
         return ArchitectureI(WindowObserver(CART, START), faults)
     return ArchitectureII(WindowObserver(CART, START), faults, START)

@@ -1,2 +1,0 @@
-#include "core.h"
-EXPORTED double core_unit(void) { return UNIT; }
