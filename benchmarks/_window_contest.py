@@ -68,7 +68,7 @@ def record(observer: WindowObserver, log: Log) -> Recording:
         assert isinstance(step, WindowStep)
         assert step.verdict == "consistent"
         base, time = int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME])
-        programs = range(*kernel.arrival_programs.py_func(size, base, time))
+        programs = kernel.arrival_programs(memory.address)
         queries.append(Query(base, time, min(base + size.block, time), programs))
         boxes.append((arrays["h_lower"].copy(), arrays["h_upper"].copy()))
         bounds = time - base > size.N - size.block

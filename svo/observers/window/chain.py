@@ -217,6 +217,6 @@ def _proven(window: Window, basis: int | None, sample: int, direction: Array) ->
     arrays["farkas"][:] = 0.0
     if basis is not None:
         k = int(arrays["k"][basis])
-        arrays["farkas"][arrays["rows"][basis, :k]] = arrays["nu"][:k]
+        arrays["farkas"][arrays["rows"][basis, :k]] = arrays["multiplier"][:k]
     found = window.certificate((sample, direction))
     return found.proven_bound(sample + window.origin, direction / window.settings.form.x)

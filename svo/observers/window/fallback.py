@@ -1,4 +1,4 @@
-"""HiGHS on a window that the compiled simplex left undecided."""
+"""HiGHS on a window that the simplex left undecided."""
 
 from __future__ import annotations
 

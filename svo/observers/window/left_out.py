@@ -61,7 +61,7 @@ def factors_of(stack: Array, owner: NDArray[np.int64], delta: Array, units: Expo
     for item in range(1, len(stack)):
         mine = np.flatnonzero(owner == item)
         reach = max((abs(rational(end)) for end in delta[mine].ravel()), default=None)
-        covered = (gains[mine].any(axis=0)[:, None] & functionals[mine].any(axis=0)) | (stack[item] != 0.0)
+        covered = (np.any(gains[mine], axis=0)[:, None] & np.any(functionals[mine], axis=0)) | (stack[item] != 0.0)
         for i, j in np.argwhere(covered).tolist():
             rest = rational(stack[item, i, j])
             for q in mine:

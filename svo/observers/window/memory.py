@@ -71,13 +71,19 @@ class WindowSettings:
 
 
 class Memory:
-    """The kernel's arrays by name, anchored at nothing yet.
+    """The block of a window and its arrays by name, anchored at nothing yet.
 
     Attributes
     ----------
     size : Sizes
+    block : Block
+        The kernel's.
+    given : dict of str to array
+        Data as given, where the kernel's are not.
     arrays : dict of str to array
-    kernel : the arrays as the kernel takes them
+        Of both.
+    address : int
+        What the kernel takes.
     """
 
     def __init__(self, settings: WindowSettings, anchor_rows: int, steps: int) -> None:
@@ -94,16 +100,31 @@ class Memory:
             ni=1 + len(model.uncertainties), N=steps, block=settings.block, K=min(rows, columns, largest) + 2,
             late=int(settings.output_is_disturbed),
         )  # fmt: skip
-        arrays = self.arrays = _room_for(self.size)
+        self.block = _room_for(self.size)
+        self.given = {} if injection is None else injection.allocate(self.size)
+        self._name_arrays()
+        arrays = self.arrays
         arrays["T"][:n] = np.eye(n)
         arrays["T"][n:] = template
         arrays["owner"][:] = owner
         arrays["delta"][:] = np.array([model.uncertainties[i - 1].bounds for i in owner]).reshape(-1, 2)
         arrays["w_rows"][:, : model.n_disturbances], arrays["w_rows_lower"][:], arrays["w_rows_upper"][:] = w_rows
         arrays["jitter"][:] = jitter(arrays["jitter"].size)
-        self.kernel = kernel.new_window(dict(arrays))
-        if injection is not None:
-            arrays |= injection.allocate(self.size)
+
+    def _name_arrays(self) -> None:
+        self.address, self.arrays = self.block.address, self.block.arrays | self.given
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"size": self.size, "block": self.block, "given": self.given}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__ |= state
+        self._name_arrays()
+
+    @property
+    def kept(self) -> dict[str, NDArray[Any]]:
+        """The arrays that a saved state holds."""
+        return {name: self.block.arrays[name] for name in self.block.kept} | self.given
 
     @property
     def time(self) -> int:
@@ -131,7 +152,7 @@ class Memory:
 
     def copy_from(self, smaller: Memory) -> None:
         """What a smaller one holds whose samples have not wrapped around: every array is a leading block of its own."""
-        for name, small in smaller.arrays.items():
+        for name, small in smaller.kept.items():
             self.arrays[name][tuple(slice(0, length) for length in small.shape)] = small
 
     def check_clock(self) -> None:
@@ -149,8 +170,8 @@ class Memory:
                 raise ValueError(f"{name} contains NaN")
 
 
-def _room_for(size: kernel.Sizes) -> dict[str, Any]:
-    """The arrays of a window, or an error that names the horizon, also where the machine has no room for them."""
+def _room_for(size: kernel.Sizes) -> kernel.Block:
+    """The block of a window, or an error that names the horizon, also where the machine has no room for them."""
     _check_room(size)
     try:
         return kernel.allocate(size)

@@ -201,19 +201,6 @@ class WindowObserver(Observer):
                 return self._said(self._start_from(self._readings) or "undecided")
         return self._said(self._window.add_late(known, sample))
 
-    def _warm_up(self) -> None:
-        other = copy(self)
-        other._make_prover = other.prover = None
-        other._forget()
-        other._begin(self._initial)
-        y, u = np.full(self.model.n_outputs, np.nan), np.zeros(self.model.n_inputs)
-        schedule = self.model.schedule
-        other.update(y, u, schedule)
-        other.step(u, y, u, schedule).box  # noqa: B018
-        other.step(u, y, u, schedule, deadline=0.0)
-        other.late_update(y, other.window[0])
-        kernel.channel_factors(self._normal.stack(schedule), self._settings.owner, other._window.memory.arrays["delta"])
-
     # -- saved states ------------------------------------------------------------------------------------
 
     def _options(self) -> dict[str, Any]:

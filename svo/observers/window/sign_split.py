@@ -131,7 +131,7 @@ class SplitPrograms:
     """
 
     def __init__(self, memory: Memory, certificate: Callable[[], WindowCertificate], limit: int) -> None:
-        self._arrays, self._window, self._size = memory.arrays, memory.kernel, memory.size
+        self._arrays, self._address, self._size = memory.arrays, memory.address, memory.size
         self._certificate, self._limit = certificate, limit
         self._open = dict(self._open_channels())
         self._saved = {name: self._arrays[name].copy() for name in _CHANGED}
@@ -175,7 +175,7 @@ class SplitPrograms:
     ) -> tuple[int, float, tuple[int, int] | None]:
         self._apply(cell)
         self._arrays["seen_base"][:] = -1  # the bases are those of other rows
-        verdict, _ = kernel.solve(self._window, self._size, task, program, program + 1, kernel.PIVOT_LIMIT)
+        verdict, _ = kernel.solve(self._address, task, program, program + 1, kernel.PIVOT_LIMIT)
         branch = self._most_violated(cell) if verdict == kernel.CONSISTENT else self._widest(cell)
         return verdict, bound(), branch
 
@@ -183,7 +183,7 @@ class SplitPrograms:
         for name, array in self._saved.items():
             self._arrays[name][...] = array
         for (k, q), (low, high) in cell.items():
-            kernel.redraw_channel(self._window, self._size, k, q, low, high)
+            kernel.redraw_channel(self._address, k, q, low, high)
 
     def _open_channels(self) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
         arrays, size = self._arrays, self._size

@@ -83,11 +83,10 @@ class Window:
         self.memory = Memory(settings, len(anchor.rows), settings.first_steps if steps is None else steps)
         n, arrays = self._model.n_states, self.memory.arrays
         arrays["h_lower"][:n], arrays["h_upper"][:n] = anchor.box_lower, anchor.box_upper
-        kernel.initialise(self.memory.kernel, self.memory.size, anchor.rows, anchor.lower, anchor.upper)
+        kernel.initialise(self.memory.address, anchor.rows, anchor.lower, anchor.upper)
         self.proof: WindowCertificate | SplitCertificate | None = None
         self.reason: str | None = None
         self._given: Array | None = None  # the newest reading
-        self._w_before: tuple[Array, Array] | None = None  # bounds of w at the newest sample
 
     # -- samples -----------------------------------------------------------------------------------
 
@@ -113,10 +112,11 @@ class Window:
         """
         memory, self.reason = self.memory, None
         if self.settings.horizon is None and memory.started and memory.time + 1 >= memory.size.N:
-            self._grow()
+            memory = self._grow()
         one_call = not self.settings.sign_split and self._injection is None
         if one_call and end is None and self.prover is None:
-            code, found, program = kernel.take(*self._arguments(sample), self.settings.eps, kernel.PIVOT_LIMIT)
+            self._hand_over(sample)
+            code, found, program = kernel.take(memory.address, self.settings.eps, kernel.PIVOT_LIMIT)
             check_entry(code)
             self._given = sample.given
             if code == kernel.OUTGROWN:
@@ -125,13 +125,13 @@ class Window:
         else:
             self._enter(sample, end)
             verdict = self._decide(end)
-        self._w_before = sample.w_lower, sample.w_upper
         return self._cut_arrival(verdict)
 
     def add_late(self, y: Array, sample: int) -> VerdictName:
         """A measurement of a sample that is still there."""
         own, memory, self.reason = sample - self.origin, self.memory, None
-        kernel.add_late(memory.kernel, memory.size, own, y, self.settings.eps)
+        memory.arrays["in_y"][:] = y
+        kernel.add_late(memory.address, own, self.settings.eps)
         if self._injection is not None:  # the sample was incomplete, so it is as it was given
             s, arrays = own % (memory.size.N + 1), memory.arrays
             arrays["given.y"][s], arrays["given.slack"][s] = arrays["y"][s], arrays["slack"][s]
@@ -203,14 +203,11 @@ class Window:
 
     def state(self) -> dict[str, NDArray]:
         """Everything but settings and prover, as named arrays."""
-        before = dict(zip(("w_old_lower", "w_old_upper"), self._w_before or (), strict=False))
-        return arrays_of("anchor", self.anchor) | before | self.memory.arrays
+        return arrays_of("anchor", self.anchor) | self.memory.kept
 
     def resume(self, state: Mapping[str, NDArray], falsified: bool) -> None:
         """Take back the memory that `state` gave; ValueError unless it is one, and its falsification proven again."""
-        take_exactly(self.memory.arrays, state)
-        if "w_old_lower" in state:
-            self._w_before = np.array(state["w_old_lower"]), np.array(state["w_old_upper"])
+        take_exactly(self.memory.kept, state)
         self.memory.check_clock()
         if falsified:
             if self.settings.sign_split:
@@ -221,20 +218,19 @@ class Window:
 
     # -- what a sample comes to --------------------------------------------------------------------------
 
-    def _grow(self) -> None:
+    def _grow(self) -> Memory:
         smaller = self.memory
-        self.memory = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N)
-        self.memory.copy_from(smaller)
+        larger = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N)
+        larger.copy_from(smaller)
+        self.memory = larger
+        return larger
 
-    def _arguments(self, sample: Sample) -> tuple[object, ...]:
-        """Those of the kernel, in one layout: it compiles anew for each that it meets."""
-        memory, w = self.memory, (sample.w_lower, sample.w_upper)
-        bounds: tuple[Array, ...] = (*(self._w_before or w), *w)
-        if self._injection is not None:
-            none = np.zeros(memory.size.nw - self._model.n_disturbances)
-            bounds = tuple(np.append(end, none) for end in bounds)
-        arrays = sample.u, sample.u_next, sample.y, sample.stack, sample.noise, *bounds
-        return memory.kernel, memory.size, not memory.started, *(np.array(a, order="C") for a in arrays)
+    def _hand_over(self, sample: Sample) -> None:
+        """Write a sample to where the kernel reads it."""
+        arrays, nw = self.memory.arrays, len(sample.w_lower)  # d, where w is injected, has no bounds of the model
+        arrays["in_u"][:], arrays["in_u_next"][:], arrays["in_y"][:] = sample.u, sample.u_next, sample.y
+        arrays["in_stack"][:], arrays["in_noise"][:] = sample.stack, sample.noise
+        arrays["in_w_lower"][:nw], arrays["in_w_upper"][:nw] = sample.w_lower, sample.w_upper
 
     def _enter(self, sample: Sample, end: float | None) -> None:
         """One sample without its programs, but for those of its channels, which stop at the time ``end``."""
@@ -243,12 +239,13 @@ class Window:
             w = sample.w_lower, sample.w_upper
             stack, y, noise, injected = self._injection.transform(sample.stack, sample.y, w)
             entered = sample._replace(stack=stack, y=y, noise=noise)
-        arguments, is_first = self._arguments(entered), not self.memory.started
-        code = kernel.enter(*arguments)
+        address, is_first = self.memory.address, not self.memory.started
+        self._hand_over(entered)
+        code = kernel.enter(address)
         check_entry(code)
         self._given = sample.given
         self._settle_channels(code == kernel.SIGN_OPEN, False, is_first, end)
-        code = kernel.move(*arguments[:3])
+        code = kernel.move(address)
         arrays, s = self.memory.arrays, self.memory.slot
         if self._injection is not None:
             arrays["given.stack"][s], arrays["given.y"][s] = sample.stack, sample.y
@@ -256,7 +253,7 @@ class Window:
         self._settle_channels(code == kernel.SIGN_OPEN, True, is_first, end)
         if injected:
             self._widen(sample)
-        if not kernel.complete(*arguments[:2], self.settings.eps):
+        if not kernel.complete(address, self.settings.eps):
             raise Outgrown
         if self._injection is not None and not injected:
             arrays["given.slack"][s] = arrays["slack"][s]
@@ -309,7 +306,7 @@ class Window:
             split = SplitPrograms(memory, self.certificate, self.settings.sign_split)
             if split.is_needed:
                 return self._solve_split(split, task)
-        verdict, program = kernel.solve(memory.kernel, memory.size, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
+        verdict, program = kernel.solve(memory.address, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
         return self._conclude(task, verdict, program)
 
     def _decide(self, end: float | None) -> VerdictName:
@@ -318,7 +315,7 @@ class Window:
             return self.solve(kernel.ARRIVAL)
         memory, decided = self.memory, False
         is_full = memory.time - memory.base > memory.size.N - memory.size.block
-        for program in self._arrival_programs():
+        for program in kernel.arrival_programs(memory.address):
             verdict = self._solve_one(kernel.ARRIVAL, program, end)
             if verdict == kernel.EMPTY_CANDIDATE and self._prove():
                 return "falsified"
@@ -331,9 +328,6 @@ class Window:
             memory.arrays["clock"][kernel.PENDING] = 1
         return "consistent" if decided else "undecided"
 
-    def _arrival_programs(self) -> range:
-        return range(*kernel.arrival_programs.py_func(self.memory.size, self.memory.base, self.memory.time))
-
     def _conclude(self, task: int, verdict: int, program: int) -> VerdictName:
         """What the programs of a task say; those after one that found the window empty have yet to be solved."""
         memory = self.memory
@@ -341,7 +335,7 @@ class Window:
             if task == kernel.ARRIVAL and self._prove():
                 return "falsified"
             after = program + 1
-            verdict, program = kernel.solve(memory.kernel, memory.size, task, after, kernel.ALL, kernel.PIVOT_LIMIT)
+            verdict, program = kernel.solve(memory.address, task, after, kernel.ALL, kernel.PIVOT_LIMIT)
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
@@ -352,15 +346,16 @@ class Window:
         while True:
             over = end is None or perf_counter() >= end or done >= kernel.PIVOT_LIMIT
             portion = kernel.PIVOT_LIMIT if end is None else 0 if over else _PIVOTS_BETWEEN_LOOKS
-            verdict, _ = kernel.solve(memory.kernel, memory.size, task, program, program + 1, portion)
+            verdict, _ = kernel.solve(memory.address, task, program, program + 1, portion)
             if over or verdict != kernel.UNDECIDED:
                 return int(verdict)
             done += portion
 
     def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
         """As `solve`, each program over its cells."""
-        arrays, size = self.memory.arrays, self.memory.size
-        programs = {kernel.NEWEST: range(2 * size.nt), kernel.QUERY: range(1)}.get(task) or self._arrival_programs()
+        arrays, address = self.memory.arrays, self.memory.address
+        fixed = {kernel.NEWEST: range(2 * self.memory.size.nt), kernel.QUERY: range(1)}
+        programs = fixed.get(task) or kernel.arrival_programs(address)
         prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
         has_point = False
         for program in programs:

@@ -110,7 +110,7 @@ class StageBuilder:
         stage = Stage(states, states, data, gains, functionals, left, nowhere, np.full(len(data.on_w), NO_ROW))
         if not self.is_late:
             return self._measure(stage)
-        reaching = gains[:, self.model.n_states :].any(axis=1)
+        reaching = np.any(gains[:, self.model.n_states :], axis=1)
         return self._measure(self._with_channels(self._with_disturbance(stage), reaching))
 
     def _with_disturbance(self, stage: Stage) -> Stage:

@@ -1,7 +1,10 @@
-"""No kernel is compiled in the middle of a run: every layout and every kind of model reaches it in one form."""
+"""Data of any memory layout, type, byte order and alignment, also read-only, are one to an observer."""
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,7 +12,7 @@ import pytest
 
 from polytopes import HPolytope
 from svo import UncertainModel, WindowObserver
-from svo.observers import window_kernel as kernel
+from svo.observers.window.memory import Memory
 
 PARTS: dict[str, Any] = {"A": [[1.0, 0.1], [0.0, 1.0]], "B": [[0.0], [0.1]], "E": [[0.0], [0.1]], "w": [0.2], "Ts": 0.1}
 START = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
@@ -19,6 +22,8 @@ def forms(values: list[float]) -> dict[str, Any]:
     array = np.array(values)
     locked = array.copy()
     locked.setflags(write=False)
+    shifted = np.zeros(8 * len(values) + 1, dtype=np.uint8)[1:].view(np.float64)
+    shifted[:] = array
     return {
         "strided": np.repeat(array, 2)[::2],
         "backwards": np.array(values[::-1])[::-1],
@@ -26,40 +31,36 @@ def forms(values: list[float]) -> dict[str, Any]:
         "Fortran": np.asfortranarray(np.vstack([array, array]))[0],
         "read-only": locked,
         "single precision": array.astype(np.float32),
+        "big-endian": array.astype(">f8"),
+        "unaligned": shifted,
         "list": values,
     }
 
 
-def signatures() -> tuple[int, int, int]:
-    return len(kernel.take.signatures), len(kernel.enter.signatures), len(kernel.solve.signatures)
+def observer_after_a_sample() -> WindowObserver:
+    observer = WindowObserver(UncertainModel(**PARTS, C=np.eye(2), n=[0.05, 0.05]), START)
+    observer.update(y0=[0.0, 0.0])
+    return observer
 
 
 @pytest.mark.parametrize("form", forms([0.0]))
-def test_no_memory_layout_compiles_after_warm_up(form: str) -> None:
-    observer = WindowObserver(UncertainModel(**PARTS, C=np.eye(2), n=[0.05, 0.05]), START)
-    observer.warm_up()
-    observer.update(y0=[0.0, 0.0])
-    before = signatures()
-    step = observer.step(u=forms([0.5])[form], y=forms([0.0, 0.05])[form])
-    assert step.verdict == "consistent"
-    assert signatures() == before
+def test_every_memory_layout_gives_the_same_bits(form: str) -> None:
+    observer, plain = observer_after_a_sample(), observer_after_a_sample()
+    step = observer.step(u=forms([0.5])[form], y=forms([0.0, 0.0625])[form])
+    expected = plain.step(u=[0.5], y=[0.0, 0.0625])
+    assert step.verdict == expected.verdict == "consistent"
+    assert np.array_equal(step.box, expected.box)
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        {"C": [[1.0, 0.0]], "F": [[0.1]]},  # an exact sensor reads the disturbance, which leaves the program
-        {"C": [[1.0, 0.0]], "n": [0.0]},
-        {"C": [[1.0, 0.0]], "n": lambda s: [s], "schedule": 0.05},
-        {"C": lambda s: [[1.0, s]], "n": [0.05], "schedule": 0.05},
-    ],
-    ids=["an exact sensor of w", "an exact sensor", "noise of the schedule", "C of the schedule"],
-)
-def test_no_kind_of_model_has_kernels_of_its_own(other: dict[str, Any]) -> None:
-    """`svo detect` took a minute for a model with exact sensors, on a machine that had compiled everything."""
-    WindowObserver(UncertainModel(**PARTS, C=[[1.0, 0.0]], n=[0.05]), START).warm_up()
-    before = signatures()
-    model = UncertainModel(**PARTS | other)
-    log = model.simulate([0.0, 0.0], np.ones((30, 1)), np.random.default_rng(0), schedule=np.full(30, 0.05))
-    assert WindowObserver(model, START).run(log).verdicts[-1] == "consistent"
-    assert signatures() == before
+def through_pickle(memory: Memory) -> Memory:
+    copied: Memory = pickle.loads(pickle.dumps(memory))
+    return copied
+
+
+@pytest.mark.parametrize("copied", [through_pickle, copy.deepcopy])
+def test_a_copy_of_a_window_is_its_bytes_and_goes_on_by_itself(copied: Callable[[Memory], Memory]) -> None:
+    observer, twin = observer_after_a_sample(), observer_after_a_sample()
+    observer._window.memory = copied(observer._window.memory)
+    assert observer._window.memory.address % 64 == 0
+    for y in ([0.0, 0.05], [0.02, np.nan], [0.0, 0.1]):
+        assert np.array_equal(observer.step([0.5], y).box, twin.step([0.5], y).box)

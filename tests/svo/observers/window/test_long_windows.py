@@ -15,7 +15,7 @@ from polytopes.exact import rational
 from svo import UncertainModel, WindowObserver
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.observers.window_kernel import rounding
+from svo.observers import window_kernel as kernel
 from tests.svo.observers.random_plants import random_plant
 
 seeds = st.integers(0, 2**32 - 1)
@@ -104,11 +104,9 @@ def test_errors_at_their_largest_are_within_the_bound_that_is_carried(radius: fl
         A = rng.normal(size=(n, n))
         A = np.diag(np.ones(n - 1), 1) if radius == 0.0 else A * radius / np.abs(np.linalg.eigvals(A)).max()
         fresh = 10.0 ** rng.uniform(-18, -14, n)
-        turned, carry, rho_next = np.empty((n, n)), np.empty((n, n)), np.empty(n)
-        rounding.turn_frame.py_func(A, frame, turned, carry)
-        rounding.carry_error.py_func(carry, turned, rho, fresh, rho_next)
-        frame, rho = turned, rho_next
-        bound = [rational(rounding.error_of.py_func(frame, rho, i)) for i in range(n)]
+        frame, carry = kernel.turn_frame(A, frame)
+        rho = kernel.carry_error(carry, frame, rho, fresh)
+        bound = [rational(kernel.error_of(frame, rho, i)) for i in range(n)]
         for j, e in enumerate(errors):
             errors[j] = exact(A) * e + exact((fresh * rng.choice([-1.0, 1.0], n))[:, None])
             assert all(abs(errors[j][i, 0]) <= bound[i] for i in range(n))

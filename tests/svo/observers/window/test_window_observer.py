@@ -1,4 +1,4 @@
-"""The window observer as its users meet it: arguments, errors, sets, deadlines, saved state, compilation."""
+"""The window observer as its users meet it: arguments, errors, sets, deadlines, saved state."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def test_eps_is_the_relative_widening_of_the_data() -> None:
     assert verdicts == ["falsified", "falsified", "consistent"]
 
 
-# -- deadlines, saved state, compilation ---------------------------------------------------------------------
+# -- deadlines, saved state ----------------------------------------------------------------------------------
 
 
 @settings(max_examples=25, deadline=None)
@@ -273,17 +273,6 @@ def test_a_state_of_another_model_is_refused() -> None:
     state = WindowObserver(cart(), BOX).state_dict()
     with pytest.raises(ValueError, match="does not belong"):
         WindowObserver.from_state_dict(UncertainModel([[1.0]], None, [[1.0]]), state)
-
-
-def test_nothing_compiles_after_warm_up() -> None:
-    model, log = flown(30, uncertainties=[Uncertainty(A=[[0.0, 0.0], [0.01, 0.0]])])
-    observer = WindowObserver(model, BOX)
-    observer.warm_up()
-    functions = (kernel.enter, kernel.move, kernel.complete, kernel.solve, kernel.initialise)
-    before = [len(f.signatures) for f in functions]
-    run_all(observer, log)
-    observer.step(log.u[0], [50.0])
-    assert [len(f.signatures) for f in functions] == before
 
 
 @pytest.mark.parametrize("horizon", [1, 2, 10, None])

@@ -1,4 +1,4 @@
-"""The compiled dual simplex against HiGHS, on the very rows of random windows."""
+"""The dual simplex against HiGHS, on the very rows of random windows."""
 
 from __future__ import annotations
 
@@ -66,6 +66,6 @@ def test_a_program_that_is_stopped_early_is_wider_and_never_narrower(limit: int)
         w["query"][:] = direction
         answers = []
         for pivots in (limit, kernel.PIVOT_LIMIT):
-            kernel.solve(memory.kernel, memory.size, kernel.QUERY, 0, 1, pivots)
+            kernel.solve(memory.address, kernel.QUERY, 0, 1, pivots)
             answers.append(float(w["answer"][0]))
         assert answers[1] <= answers[0] + 1e-12 * abs(answers[0])
