@@ -11,7 +11,6 @@ from functools import partial
 from time import perf_counter
 
 import numpy as np
-from numba.core import event
 from rich.table import Table
 
 from aircraft.eclipse.plant import Eclipse
@@ -116,9 +115,8 @@ def report_first_steps() -> None:
     begun = perf_counter()
     bank.warm_up()
     result = {"warm_up": perf_counter() - begun}
-    with event.install_recorder("numba:compile") as compiled:
-        healthy = bank.run(log).seconds[:, 0]
-        alarms = second.run(faulty)
+    healthy = bank.run(log).seconds[:, 0]
+    alarms = second.run(faulty)
     alarm_at = alarms.died_at["nominal"]
     assert alarm_at is not None
     result |= {
@@ -127,7 +125,6 @@ def report_first_steps() -> None:
         "largest_of_first_ten_steps": healthy[1:11].max(),
         "median_step": float(np.median(healthy[1:])),
         "first_alarm": alarms.seconds[alarm_at, 0],
-        "compilations": len(compiled.buffer),
     }
     print(json.dumps(result))
 
@@ -142,8 +139,5 @@ def tabulate_first_steps() -> Table:
     table.add_column("microseconds", justify="right")
     table.add_column("of the median step", justify="right")
     for name, value in result.items():
-        if name == "compilations":
-            table.add_row("compilations after warm_up", str(value), "-")
-        else:
-            table.add_row(name.replace("_", " "), f"{1e6 * value:.0f}", f"{value / result['median_step']:.1f}")
+        table.add_row(name.replace("_", " "), f"{1e6 * value:.0f}", f"{value / result['median_step']:.1f}")
     return table

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import linprog
 
-from polytopes import HPolytope, kernel, warm_up
+from polytopes import HPolytope, kernel
 from polytopes.highs import HighsProgram
 
 Floats = NDArray[np.float64]
@@ -95,7 +95,6 @@ def measure_box_in_kernel(variables: int, rows: int) -> tuple[float, float]:
 
 def main() -> None:
     """Measure and print."""
-    warm_up()
     table = Table(title=f"LP kernel, {PROGRAMS} directions over one polytope, CPU microseconds per program")
     for column in ("variables", "rows", "kernel", "kernel, one call each", "HiGHS, warm", "SciPy linprog",
                    "HiGHS / kernel", "SciPy / kernel", "largest difference"):  # fmt: skip

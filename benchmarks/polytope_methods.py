@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from benchmarks.lp_kernel import random_polytope
 from benchmarks.polytopes import shortest, sparse_polytope
-from polytopes import HPolytope, ProjectionLimitError, warm_up
+from polytopes import HPolytope, ProjectionLimitError
 from polytopes.redundancy import irredundant
 
 PROJECTIONS = (  # variables, kept, rows, nonzeros in a row
@@ -44,7 +44,6 @@ def redundancy(variables: int, rows: int, tangent: bool) -> tuple[float, float]:
 
 def main() -> None:
     """Measure and print."""
-    warm_up()
     console = Console(width=120)
     methods = Table("projection", *METHODS, title="Projection, CPU milliseconds")
     for variables, kept, rows, nonzeros in PROJECTIONS:

@@ -3,20 +3,18 @@
 Run with ``OPENBLAS_NUM_THREADS=1 python -m benchmarks.polytopes``: the times are CPU milliseconds, best of several
 runs, and threads that wait would count.  Peers are cdd, HiGHS (one warm program per row), the Parma library (exact) and
 the library polytope, each where it is installed and ends in reasonable time.  The agreement column is the largest
-difference of support functions in 200 directions.  Fresh processes measure the import, the first compilation and the
-memory of a dense projection.  The table goes to ``polytopes.txt`` and a picture to ``polytopes.png``, in the folder
+difference of support functions in 200 directions.  Fresh processes measure the import and the memory of a dense
+projection.  The table goes to ``polytopes.txt`` and a picture to ``polytopes.png``, in the folder
 ``build/benchmarks`` or the one of ``--out``.
 """
 
 import argparse
 import importlib
-import os
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.lp_kernel import random_polytope, seconds
-from polytopes import HPolytope, conversions, convex_hull, warm_up
+from polytopes import HPolytope, conversions, convex_hull
 from polytopes.highs import HighsProgram
 
 Floats = NDArray[np.float64]
@@ -244,16 +242,12 @@ def draw(timings: list[Timing], path: Path) -> None:
     plt.close(figure)
 
 
-def fresh(code: str, **environment: str) -> str:
+def fresh(code: str) -> str:
     """What a fresh interpreter prints."""
-    return subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, **environment}, capture_output=True, text=True, check=True
-    ).stdout.strip()
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 
 
-TIMED = "from time import process_time; {0}; t = process_time(); {1}; print(process_time() - t)"
-IMPORT = TIMED.format("pass", "import polytopes")
-WARM_UP = TIMED.format("import polytopes", "polytopes.warm_up()")
+IMPORT = "from time import process_time; t = process_time(); import polytopes; print(process_time() - t)"
 MEMORY = """
 import resource, tracemalloc
 from benchmarks.polytopes import sparse_polytope
@@ -269,14 +263,10 @@ print(f"{tracemalloc.get_traced_memory()[1] / 2**20:.1f} MB allocated, {grown / 
 
 
 def costs_of_a_process() -> str:
-    """Import, compilation and memory, each in a fresh process."""
-    with TemporaryDirectory() as cache:
-        first = float(fresh(WARM_UP, NUMBA_CACHE_DIR=cache))
-        cached = float(fresh(WARM_UP, NUMBA_CACHE_DIR=cache))
+    """Import and memory, each in a fresh process."""
     imported = min(float(fresh(IMPORT)) for _ in range(3))
     return (
         f"import polytopes: {imported:.2f} s of CPU time\n"
-        f"warm_up: {first:.1f} s the first time on a machine, {cached:.2f} s after\n"
         f"memory of a projection R^6 -> R^4, 40 dense rows: {fresh(MEMORY)}"
     )
 
@@ -286,7 +276,6 @@ OUT = Path("build/benchmarks")
 
 def main(out: Path = OUT) -> None:
     """Measure, print, and write the table and its picture to a folder."""
-    warm_up()
     cases = [
         *(redundancy(n, 200) for n in (4, 6, 8)),
         projection(8, 4, 50, 2),

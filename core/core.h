@@ -16,6 +16,13 @@
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 
+/* A function of long loops: built for wider vectors too, and chosen when the library is loaded. The same bits. */
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__)
+#define WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define WIDE
+#endif
+
 typedef int64_t integer;
 
 #define UNIT 1.1102230246251565e-16 /* unit roundoff */

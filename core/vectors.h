@@ -47,6 +47,28 @@ static inline double largest_magnitude(const double *restrict a, integer m)
     return largest;
 }
 
+/* The largest entry, or zero. */
+static inline double largest_above(const double *restrict a, integer m)
+{
+    double part[4] = {0.0, 0.0, 0.0, 0.0};
+    integer j = 0;
+    for (; j + 4 <= m; j += 4)
+        for (int lane = 0; lane < 4; lane++) part[lane] = larger(a[j + lane], part[lane]);
+    for (; j < m; j++) part[0] = larger(a[j], part[0]);
+    return larger(larger(part[0], part[1]), larger(part[2], part[3]));
+}
+
+/* The smallest entry, or zero. */
+static inline double smallest_below(const double *restrict a, integer m)
+{
+    double part[4] = {0.0, 0.0, 0.0, 0.0};
+    integer j = 0;
+    for (; j + 4 <= m; j += 4)
+        for (int lane = 0; lane < 4; lane++) part[lane] = smaller(a[j + lane], part[lane]);
+    for (; j < m; j++) part[0] = smaller(a[j], part[0]);
+    return smaller(smaller(part[0], part[1]), smaller(part[2], part[3]));
+}
+
 /* target += sum over q of factor[q] row index[q] of a matrix of m columns, four rows a pass. */
 static inline void add_rows(double *restrict target, const double *restrict matrix, const integer *restrict index,
                             const double *restrict factor, integer count, integer m)

@@ -16,7 +16,6 @@ import numpy as np
 from polytopes import kernel
 from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError
-from polytopes.linear_program import warm_up
 from polytopes.redundancy import settle
 
 _LOG = logging.getLogger("polytopes")
@@ -52,7 +51,6 @@ def eliminate(
     ProjectionLimitError
         If one step would form more than `max_rows` rows.
     """
-    warm_up()
     inner, left, rest = np.ascontiguousarray(inner), np.arange(A.shape[1]), np.array(columns, dtype=np.int64)
     table, known = np.concatenate([A, b[:, None]], axis=1), np.zeros(b.size, np.int64)
     done, state = 0, kernel.PAUSED

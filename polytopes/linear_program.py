@@ -2,16 +2,14 @@
 
 `Program` holds ``{x : A x <= b, C x = d}`` ready for solving: equalities eliminated (exactly), constant rows set aside,
 rows and coordinates in even units, which are powers of two.  Solvers see only numbers in these units, so that no unit
-of the user changes an answer.  Small programs go to the compiled kernel, large ones to HiGHS.  Where floats give no
+of the user changes an answer.  Small programs go to the compiled core, large ones to HiGHS.  Where floats give no
 clean answer (an iteration limit, a ray or a pivot near rounding), the rational simplex decides if the program is small
 enough, else HiGHS.  Every maximum comes as an upper bound of the exact one, by weak duality with a bound of what was
 rounded; what none of them settles is reported as undecided, never guessed.
 """
 
-import logging
-import threading
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from flint import fmpq
@@ -39,34 +37,12 @@ _FARTHEST = 1e150  # distance of a hyperplane from the origin; the squares of co
 _EVEN_POWERS = 2  # exponents of two by which the units of the axes may differ from even ones
 _UNEVEN = 256.0  # ratio of the widths along two axes from which the axes are scaled
 
-_ANNOUNCE_AFTER = 1.5  # seconds; loading the kernels from the cache takes less
-
 OPTIMAL, UNBOUNDED, UNDECIDED = "optimal", "unbounded", "undecided"
 _NAMES = {kernel.OPTIMAL: OPTIMAL, kernel.UNBOUNDED: UNBOUNDED}
 
 
-@cache
 def warm_up() -> None:
-    """Compile the kernels, or load them from the cache, so that no later call has to.
-
-    The first time on a machine takes some 30 s, and one line on the logger ``polytopes`` says so; afterwards it
-    takes a fraction of a second.  Called on first use; call it yourself before a loop that must not be delayed.
-    """
-    line = "compiling the LP kernels: once on this machine, about 30 s"
-    announce = threading.Timer(_ANNOUNCE_AFTER, logging.getLogger("polytopes").warning, [line])
-    announce.daemon = True
-    announce.start()
-    try:
-        AT, b, norms = np.array([[1.0, -1.0]]), np.ones(2), np.ones(2)
-        kernel.interior(AT, b, norms, np.zeros(1), 1.0)
-        kernel.supports(AT, b, np.zeros(1), np.ones((1, 1)))
-        kernel.irredundant(AT, b, np.zeros(1))
-        kernel.scaled(np.ones((1, 1)), np.ones(1))
-        kernel.exponents(np.ones((1, 1)), np.ones(1))
-        table, names = np.array([[1.0, 1.0, 1.0], [-1.0, 0.0, 1.0], [0.0, -1.0, 1.0]]), np.arange(2)
-        kernel.eliminate(table, np.zeros(3, np.int64), names, names[:1], np.zeros(2), 10, False)
-    finally:
-        announce.cancel()
+    """Nothing: the compiled core is loaded with the package.  Programs that call it before a loop go on working."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +164,6 @@ class Program:
         # By duality a largest ball has a radius of at most max |b_i| / |a_i|, or none at all.
         cap = 2.0 * self.size / float(self.norms.min())
         if self._small:
-            warm_up()
             z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), cap)
             if status == kernel.OPTIMAL:
                 return Interior(self.lift(z), z, _uncapped(radius, cap), weights, True)
@@ -396,7 +371,6 @@ class Program:
         )
 
     def _by_kernel(self, reduced: Floats) -> _Solved:
-        warm_up()
         points, active, y, values, spare, beside, status = kernel.supports(self.AT, self.rhs, self.centre, reduced)
         weights = np.zeros((len(reduced), self.kept.size))
         row, slot = np.nonzero(active >= 0)

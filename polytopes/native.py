@@ -1,13 +1,14 @@
 """The compiled core: one shared library (`core/`, C99), called without Python's headers and with the GIL released.
 
-A function is declared once, with the kinds of its arguments; what it is given is an address, and whoever calls keeps the
-array alive for the time of the call.
+A function is declared once, with the kinds of its arguments. An array is given as it is (`Array`: C-contiguous, of the
+type that the function expects), or by an address, and then whoever calls keeps it alive for the time of the call.
 """
 
 from __future__ import annotations
 
 import ctypes
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,21 @@ PATH = Path(__file__).with_name(f"_core.{_SUFFIX}")
 Address = ctypes.c_void_p
 Integer = ctypes.c_int64
 Real = ctypes.c_double
+
+_bytes = (ctypes.c_char * 0).from_buffer  # a quarter of the time of the array's own interface
+
+
+class Array:
+    """The kind of an argument that is an array, which may be read-only."""
+
+    @staticmethod
+    def from_param(array: NDArray) -> Any:
+        try:
+            return _bytes(array)  # type: ignore[arg-type]  # arrays are buffers
+        except TypeError:
+            if not array.flags.c_contiguous:
+                raise
+            return Address(array.__array_interface__["data"][0])
 
 
 def _load() -> ctypes.CDLL:
@@ -37,10 +53,10 @@ _library = _load()
 
 
 def function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., Any]:
-    """A function of the core by its name, the kinds of its arguments (`Address`, `Integer`, `Real`) and its result."""
-    found = getattr(_library, name)
+    """A function of the core by its name, and its result; kinds are `Array`, `Address`, `Integer` and `Real`."""
+    found = _library[name]  # one of its own: by attribute, all who ask share one and its kinds
     found.argtypes, found.restype = arguments, returns
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def address(array: NDArray) -> int:
@@ -48,11 +64,30 @@ def address(array: NDArray) -> int:
     return int(array.__array_interface__["data"][0])
 
 
+class _Scratch(threading.local):
+    """One block a thread, kept: a call of the core leaves nothing in it that a later one needs."""
+
+    size = 0
+
+    def room(self, doubles: int) -> int:
+        if doubles > self.size:
+            self.size = doubles + doubles // 2
+            self.block = np.empty(self.size)
+            self.start = address(self.block)
+        return self.start
+
+
+scratch = _Scratch().room
+"""Where a block of so many doubles lies that a call of the core may overwrite."""
+
+
 def floats(values: ArrayLike) -> NDArray[np.float64]:
-    """The values in the layout that the core reads: C-contiguous and aligned doubles; a copy only where they are not."""
-    return np.require(values, np.float64, ("C", "A"))
+    """The values as C-contiguous and aligned doubles, as the core reads them; a copy only where they are not."""
+    array = np.asarray(values, np.float64, order="C")
+    return array if array.flags.aligned else array.copy()
 
 
 def integers(values: ArrayLike) -> NDArray[np.int64]:
     """The values as C-contiguous and aligned int64."""
-    return np.require(values, np.int64, ("C", "A"))
+    array = np.asarray(values, np.int64, order="C")
+    return array if array.flags.aligned else array.copy()

@@ -9,7 +9,7 @@ from polytopes.checks import Floats
 from polytopes.exact import rational, rational_matrix, rational_vector
 from polytopes.exact_simplex import affordable
 from polytopes.frame import unit_body
-from polytopes.linear_program import Program, prepare, warm_up
+from polytopes.linear_program import Program, prepare
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
 
@@ -60,7 +60,6 @@ def irredundant(AT: Floats, b: Floats, inner: Floats) -> Indices:
     inner : array (n,)
         A point strictly inside.
     """
-    warm_up()
     AT, b, inner = np.ascontiguousarray(AT), np.ascontiguousarray(b), np.ascontiguousarray(inner)
     kept, doubtful = kernel.irredundant(AT, b, inner)
     return kept[settle(AT[:, kept].T, b[kept], inner, doubtful)] if doubtful.any() else kept

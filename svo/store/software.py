@@ -7,7 +7,7 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-_PACKAGES = ("svo-fdi", "numpy", "scipy", "numba", "highspy", "python-flint", "pyarrow")
+_PACKAGES = ("svo-fdi", "numpy", "scipy", "highspy", "python-flint", "pyarrow")
 
 
 @cache

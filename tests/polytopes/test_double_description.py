@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from exact_sets import polyhedron
 
-from polytopes import HPolytope, UndecidedError, convex_hull, warm_up
+from polytopes import HPolytope, UndecidedError, convex_hull
 from polytopes.double_description import cone_generators
 from polytopes.minkowski_weyl import ExactGenerators, generators_of, rows_of
 
@@ -25,7 +25,6 @@ def cyclic(points: int, n: int) -> np.ndarray:
 
 
 def test_the_cut_polytope_of_six_nodes() -> None:
-    warm_up()  # compiling, where it has to, is not what is measured
     start = time.process_time()
     P = HPolytope.from_vertices(cut_vectors(6))
     assert (P.b.size, P.d.size) == (368, 0)

@@ -8,8 +8,8 @@ from exact_sets import minimal_size, polyhedron
 from random_programs import many
 
 from polytopes import HPolytope
-from polytopes.kernel.facets import centred
 from polytopes.linear_program import Program
+from polytopes.native import Array, Integer, function
 from polytopes.redundancy import irredundant
 
 
@@ -74,12 +74,14 @@ def test_a_far_row_does_not_loosen_the_others() -> None:
 
 
 def test_slacks_at_the_centre_have_twice_the_precision() -> None:
-    """Compiled with reordering allowed, the sum that holds what was rounded off is optimised away."""
+    """Built with reordering allowed, the sum that holds what was rounded off is optimised away."""
+    centred = function("fdi_centred", *[Integer] * 2, *[Array] * 6, returns=Integer)
     for seed in range(20):
         rng = np.random.default_rng(seed)
         A, x = rng.standard_normal((6, 3)), rng.standard_normal(3)
         b = A @ x + 1e-15 * rng.random(6)
-        _, rhs, inside = centred(np.ascontiguousarray(A.T), b, x)
+        rhs = np.empty(6)
+        inside = centred(3, 6, np.ascontiguousarray(A.T), b, x, np.empty((3, 6)), rhs, np.empty(100))
         exact = [Fraction(v) - sum(Fraction(p) * Fraction(q) for p, q in zip(row, x.tolist(), strict=True))
                  for row, v in zip(A.tolist(), b.tolist(), strict=True)]  # fmt: skip
         assert inside == all(v > 0 for v in exact)

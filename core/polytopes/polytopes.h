@@ -1,0 +1,86 @@
+/* Dense linear programs of few variables over {x : A x <= b}, and what is made of many of them.
+ *
+ * memory.h       the caller's block, laid out in pieces
+ * powers.h       powers of two
+ * basis.c        a basis: its edges, its vertex, its slacks
+ * simplex.c      the primal simplex method in inequality form
+ * duality.c      bounds of the optima that no rounding undercuts
+ * programs.c     a largest ball, support points
+ * scaling.c      even units for rows and columns
+ * centre.c       rows seen from a point inside, duplicates left out
+ * facets.c       redundancy of rows: one program a row
+ * clarkson.c     the same over the facets that are known so far
+ * elimination.c  Fourier-Motzkin elimination
+ *
+ * Rows arrive scaled by powers of two, with Euclidean norms in [1/2, 2), and transposed, so that loops over rows are
+ * contiguous. Sizes: d variables, m rows. An exported function works in a block of the caller's, of as many doubles as
+ * the function of its name and `_room` says.
+ */
+#ifndef POLYTOPES_H
+#define POLYTOPES_H
+
+#include "core.h"
+#include "polytopes/memory.h"
+
+enum { OPTIMAL, STOPPED, UNBOUNDED, AMBIGUOUS, LIMIT }; /* how a program ends */
+enum { FINISHED, TOO_MANY, OPEN, PAUSED, NO_ROOM };     /* how an elimination ends */
+enum { NO, YES, DOUBT };                                /* whether a row is needed */
+
+typedef struct {
+    integer d, m, stride; /* entry j of row i is at[j * stride + i] */
+    const double *at;     /* (d, m) */
+    const double *b;      /* (m,) */
+} Rows;
+
+/* Where the simplex method stands: d active rows, of which a slot may instead hold -1 - j for "x_j free". */
+typedef struct {
+    double *x;    /* (d,) point */
+    double *s;    /* (m,) slacks b - A x */
+    integer *W;   /* (d,) active row of each slot */
+    double *Q;    /* (d, d) edges: row k opens when slot k is released; the inverse of the active rows, transposed */
+    double *y;    /* (d,) multipliers of the active rows */
+    double *p;    /* (d,) direction of a move */
+    double *rate; /* (m,) A p */
+    double *ratio; /* (m,) what the ratio test compares */
+    double *alpha; /* (d,) a row as a combination of the active rows */
+    double *work; /* (d, 2 d) */
+} State;
+
+/* basis.c */
+void lay_out_state(State *at, Memory *memory, integer d, integer m);
+void combine(const Rows *rows, const double *p, double *rate);                  /* rate = A p */
+void slacks(const Rows *rows, const double *x, double *s);                      /* s = b - A x */
+void settle(const Rows *rows, State *at);                                       /* x onto its active rows, s */
+int invert_basis(const Rows *rows, const integer *W, double *Q, double *work);  /* 0 if singular */
+void coordinates(const Rows *rows, integer i, const double *Q, double *alpha);  /* row i over the active rows */
+void exchange(double *Q, const double *alpha, integer slot, integer d);         /* that row takes a slot */
+void begin_at_origin(const Rows *rows, State *at);
+void begin(const Rows *rows, const double *x0, State *at);
+double scale_of(const Rows *rows);
+
+/* simplex.c */
+integer ascend(const Rows *rows, const double *c, State *at, double scale, double stop);
+integer repair(const Rows *rows, State *at, double scale);
+integer optimise(const Rows *rows, const double *c, State *at, double scale);
+
+/* duality.c */
+double dual_bound(const Rows *rows, const double *c, State *at, double *beside, double *spare, double *work);
+
+/* centre.c */
+integer distinct(const Rows *rows, integer *chosen, Memory memory);
+integer distinct_room(integer d, integer m);
+int centred(const Rows *rows, const integer *chosen, integer k, const double *x0, double *at, double *b, Memory memory);
+integer centred_room(integer k);
+
+/* facets.c */
+int exceeds(const Rows *rows, const double *c, double slack, State *at);
+void put_column(double *c, const Rows *rows, integer i);
+integer irredundant(const Rows *rows, const double *x0, const integer *known, integer *chosen, integer *doubtful,
+                    Memory memory);
+integer irredundant_room(integer d, integer m);
+
+/* clarkson.c */
+void clarkson(const Rows *rows, const integer *asked, integer *keep, integer *doubtful, Memory memory);
+integer clarkson_room(integer d, integer m);
+
+#endif

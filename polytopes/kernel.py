@@ -1,0 +1,217 @@
+"""Dense linear programs of few variables, and what is made of many of them: the face of `core/polytopes`.
+
+Results and scratch are allocated here; the core writes them.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polytopes.native import Address, Array, Integer, Real, floats, function, scratch
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+OPTIMAL, STOPPED, UNBOUNDED, AMBIGUOUS, LIMIT = range(5)
+FINISHED, TOO_MANY, OPEN, PAUSED, _NO_ROOM = range(5)
+
+_ROOM = 1000  # rows of an elimination for which there is room from the start
+
+
+def _room(name: str, sizes: int) -> Any:
+    """The function of the core that says how many doubles one of its functions works in."""
+    return lru_cache(1024)(function(f"fdi_{name}_room", *[Integer] * sizes, returns=Integer))
+
+
+_interior = function("fdi_interior", *[Integer] * 2, *[Array] * 4, Real, Array, Address, returns=Integer)
+_interior_room = _room("interior", 2)
+_supports = function("fdi_supports", *[Integer] * 3, *[Array] * 6, Address)
+_supports_room = _room("supports", 3)
+_irredundant = function("fdi_irredundant", *[Integer] * 2, *[Array] * 5, Address, returns=Integer)
+_irredundant_room = _room("irredundant", 2)
+_eliminate = function("fdi_eliminate", *[Integer] * 3, *[Array] * 10, returns=Integer)
+_eliminate_room = _room("eliminate", 2)
+_exponents = function("fdi_exponents", *[Integer] * 2, *[Array] * 4, Address)
+_exponents_room = _room("exponents", 2)
+_scaled = function("fdi_scaled", *[Integer] * 2, *[Array] * 4, Address, returns=Integer)
+_scaled_room = _room("scaled", 2)
+
+
+def interior(AT: Floats, b: Floats, norms: Floats, x0: Floats, cap: float) -> tuple[Floats, float, int, Floats]:
+    """Largest ball ``a_i'x + |a_i| r <= b_i`` with ``r <= cap``.
+
+    Parameters
+    ----------
+    AT, b : arrays (d, m) and (m,)
+        Scaled rows, transposed.
+    norms : array (m,)
+        Euclidean norms of the rows.
+    x0 : array (d,)
+        Any starting point; it need not be feasible.
+    cap : float
+        Upper limit of the radius; keeps the program bounded on unbounded sets.
+
+    Returns
+    -------
+    x, r, status, multipliers
+        Centre (d,), radius (negative if the rows have no common point), status, and multipliers of the rows (m,).
+        With r < 0 they combine the rows to ``0'x <= r``: Farkas' multipliers.
+    """
+    d, m = AT.shape
+    found = np.empty(d + 1 + m)
+    status = _interior(d, m, AT, b, norms, x0, cap, found, scratch(_interior_room(d, m)))
+    return found[:d], float(found[d]), status, found[d + 1 :]
+
+
+def supports(
+    AT: Floats, b: Floats, x0: Floats, directions: Floats
+) -> tuple[Floats, Indices, Floats, Floats, Floats, Floats, Indices]:
+    """Support points in k directions, each program started from the vertex of its neighbour.
+
+    Parameters
+    ----------
+    AT, b : arrays (d, m) and (m,)
+        Scaled rows, transposed.
+    x0 : array (d,)
+        A feasible point.
+    directions : array (k, d)
+
+    Returns
+    -------
+    points, active, multipliers, bounds, spare, beside, status
+        Arrays (k, d), (k, d), (k, d), (k,), (k,), (k, d), (k,).  All but the last mean something only where the status
+        is `OPTIMAL`: then ``c'x <= bounds - spare + beside'|x|`` for all x of the set.
+    """
+    (d, m), k = AT.shape, len(directions)
+    directions, found, codes = floats(directions), np.empty((3 * d + 2, k)), np.empty((d + 1, k), np.int64)
+    _supports(
+        d, m, k, AT, b, x0, directions, found, codes,
+        scratch(_supports_room(d, m, k)),
+    )  # fmt: skip
+    points, multipliers, beside = found[: 3 * d].reshape(3, k, d)
+    return points, codes[:d].reshape(k, d), multipliers, found[3 * d], found[3 * d + 1], beside, codes[d]
+
+
+def irredundant(AT: Floats, b: Floats, x0: Floats) -> tuple[Indices, Indices]:
+    """Numbers of a minimal set of rows, and for each whether it is doubtful; Clarkson's method if there are many rows.
+
+    Parameters
+    ----------
+    AT, b : arrays (d, m) and (m,)
+        Rows without zero rows, transposed.
+    x0 : array (d,)
+        A point strictly inside; if rounding cannot tell that it is, every row is doubtful.
+
+    Returns
+    -------
+    rows, doubtful : arrays (k,) and (k,) of int
+        A doubtful row is kept, and may be redundant.
+    """
+    d, m = AT.shape
+    rows, doubtful = np.empty((2, m), np.int64)
+    k = _irredundant(d, m, AT, b, x0, rows, doubtful, scratch(_irredundant_room(d, m)))
+    return rows[:k], doubtful[:k]
+
+
+def eliminate(
+    table: Floats, known: Indices, left: Indices, columns: Indices, inner: Floats, max_rows: int, cautious: bool
+) -> tuple[Floats, Indices, Indices, Floats, Indices, Indices, int, int]:
+    """Eliminate coordinates, the one that makes the fewest pairs first, until Python has to decide.
+
+    Rows are pruned at the end, and before a step whenever it would form many more than the last pruning left.
+
+    Parameters
+    ----------
+    table : array (m, d + 1)
+        Rows ``[A, b]`` without zero rows.
+    known : array (m,) of int
+        1 for rows that are facets for sure.
+    left : array (d,) of int
+        Names of the columns of A.
+    columns : array of int
+        Those to eliminate.
+    inner : array (d,)
+        A point strictly inside.
+    max_rows : int
+        Limit on the rows that a step forms.
+    cautious : bool
+        Whether to stop already where the step after the next is foreseen to form more.
+
+    Returns
+    -------
+    table, left, columns, inner
+        What is left.
+    doubtful : array of int
+        Whether a row of the table may be redundant.
+    trace : array (steps, 2) of int
+        Rows formed and kept by each step that was done.
+    formed : int
+        Rows that the next step would form, if they are too many.
+    state : int
+        `FINISHED`, `TOO_MANY`, `OPEN` (rows are doubtful) or `PAUSED` (after a long step).
+    """
+    m, width = table.shape
+    left, columns, inner = left.copy(), columns.copy(), inner.copy()
+    trace = np.zeros((columns.size, 2), np.int64)
+    progress = np.array([m, width - 1, columns.size, m, 0, 0, 0])  # rows, dim, columns, least, steps, long, formed
+    state, needed = _NO_ROOM, max(m, _ROOM)
+    while state == _NO_ROOM:
+        room, rows, size = needed, int(progress[0]), int(progress[0]) * (int(progress[1]) + 1)
+        tables, flags = np.empty((2, room * width)), np.zeros((2, room), np.int64)
+        tables[0, :size], flags[0, :rows] = table.ravel()[:size], known[:rows]
+        table, known = tables[0], flags[0]
+        block = np.empty(_eliminate_room(width - 1, room))
+        state = _eliminate(
+            room, max_rows, cautious, table, tables[1], known, left,
+            columns, inner, flags[1], trace, progress, block,
+        )  # fmt: skip
+        needed = int(progress[6])
+    rows, dim, many, _, steps, _, formed = progress.tolist()
+    rest = table[: rows * (dim + 1)].reshape(rows, dim + 1)
+    return rest, left[:dim], columns[:many], inner[:dim], flags[1, :rows], trace[:steps], formed, state
+
+
+def exponents(rows: Floats, rhs: Floats) -> tuple[Indices, Indices]:
+    """Exponents r (m,) and s (d,): ``2^(r_i + s_j) rows[i, j]`` has rows whose largest entry is in [1/2, 1).
+
+    ``2^r_i rhs[i]`` is at most one, and about one somewhere in each block of coordinates that rows join, and in rows of
+    zeros.
+
+    Parameters
+    ----------
+    rows, rhs : arrays (m, d) and (m,)
+    """
+    m, d = rows.shape
+    r, s = np.empty(m, np.int64), np.empty(d, np.int64)
+    _exponents(m, d, rows, rhs, r, s, scratch(_exponents_room(m, d)))
+    return r, s
+
+
+def scaled(rows: Floats, rhs: Floats) -> tuple[Floats, Floats, Floats, Indices, Indices, Indices, int, int]:
+    """The rows that are not zero in even units, transposed, with norms in [1/2, 1).
+
+    Parameters
+    ----------
+    rows, rhs : arrays (m, d) and (m,)
+
+    Returns
+    -------
+    AT, b, norms : arrays (d, k), (k,) and (k,)
+    r, s : arrays (k,) and (d,) of int
+        The exponents.
+    kept : array (k,) of int
+        The rows that are not zero.
+    far, lost : int
+        A row whose hyperplane is more than 1e150 from the origin, and one whose scaled numbers are no floats; -1 if
+        there is none.
+    """
+    m, d = rows.shape
+    found, codes = np.empty((d + 2) * m), np.empty(2 * m + d + 2, np.int64)
+    k = _scaled(m, d, rows, rhs, found, codes, scratch(_scaled_room(m, d)))
+    AT, b, norms = found[: d * k].reshape(d, k), found[d * k : (d + 1) * k], found[(d + 1) * k : (d + 2) * k]
+    s, r, kept, (far, lost) = codes[:d], codes[d : d + k], codes[d + m : d + m + k], codes[d + 2 * m :].tolist()
+    return AT, b, norms, r, s, kept, far, lost

@@ -1,0 +1,51 @@
+"""The door to the compiled core: which arrays it takes, and the room that it is given."""
+
+import numpy as np
+import pytest
+
+from polytopes import HPolytope, kernel
+from polytopes.native import Array, Integer, floats, function
+
+
+def test_read_only_arrays_are_taken_and_strided_ones_are_not() -> None:
+    exponents = function("fdi_exponents", *[Integer] * 2, *[Array] * 5)
+    rows, r, s, block = np.array([[8.0, 1.0]]), np.empty(1, np.int64), np.empty(2, np.int64), np.empty(100)
+    rows.flags.writeable = False
+    exponents(1, 2, rows, np.ones(1), r, s, block)
+    assert (r[0] + s).tolist() == [-4, -1]
+    with pytest.raises(Exception, match="contiguous"):
+        exponents(1, 2, np.ones((1, 4))[:, ::2], np.ones(1), r, s, block)
+
+
+@pytest.mark.parametrize("form", ["F", "strided", "byte order", "integer", "misaligned"])
+def test_floats_are_one_layout_whatever_came(form: str) -> None:
+    values = np.arange(12.0).reshape(3, 4)
+    moved = np.zeros(8 * 12 + 1, np.uint8)[1:].view(np.float64).reshape(3, 4)
+    moved[:] = values
+    given = {
+        "F": np.asfortranarray(values), "strided": np.repeat(values, 2, axis=1)[:, ::2],
+        "byte order": values.astype(">f8"), "integer": values.astype(int), "misaligned": moved,
+    }[form]  # fmt: skip
+    found = floats(given)
+    np.testing.assert_array_equal(found, values)
+    assert found.flags.c_contiguous
+    assert found.flags.aligned
+    assert found.dtype == np.float64
+    assert found.dtype.isnative
+
+
+def test_an_elimination_goes_on_where_its_room_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    A = rng.standard_normal((30, 5))
+    arguments = (np.zeros(30, np.int64), np.arange(5), np.arange(2), np.zeros(5), 10_000, False)
+    table = np.hstack([A / np.linalg.norm(A, axis=1)[:, None], rng.uniform(0.5, 1.5, (30, 1))])
+    expected = kernel.eliminate(table, *arguments)
+    monkeypatch.setattr(kernel, "_ROOM", 1)
+    for found, right in zip(kernel.eliminate(table, *arguments), expected, strict=True):
+        np.testing.assert_array_equal(found, right)
+
+
+def test_directions_of_any_layout_have_the_same_supports() -> None:
+    P = HPolytope.box([-1.0, 0.0, 2.0], [1.0, 0.5, 3.0])
+    C = np.random.default_rng(0).standard_normal((5, 3))
+    np.testing.assert_array_equal(P.support_points(np.asfortranarray(C)).values, P.support_points(C).values)
