@@ -153,23 +153,25 @@ EXPORTED integer fdi_window_complete(void *block, double eps)
     return complete(&w, eps);
 }
 
-/* A whole sample in one call: `enter`, `move`, `complete`, CHANNELS where signs are open, and ARRIVAL.
- *
- * Returns what `enter` returns, or OUTGROWN, + 8 (verdict + 4 (program + 1)), as `fdi_window_solve`. */
+integer take(const window *w, double eps, integer limit, answer *found)
+{
+    *found = (answer){UNDECIDED, -1};
+    const integer code = enter(w);
+    if (code != FINE && code != SIGN_OPEN) return code;
+    if (code == SIGN_OPEN) settle(w, 0, limit);
+    if (move(w) == SIGN_OPEN) settle(w, 1, limit);
+    if (!complete(w, eps)) return OUTGROWN;
+    *found = solve_programs(w, ARRIVAL, 0, 2 * w->nt, limit);
+    return code;
+}
+
+/* A whole sample in one call. Returns its code + 8 (verdict + 4 (program + 1)), as `fdi_window_solve`. */
 EXPORTED integer fdi_window_take(void *block, double eps, integer limit)
 {
     window w;
     window_open(&w, block);
-    answer found = {UNDECIDED, -1};
-    integer code = enter(&w);
-    if (code == FINE || code == SIGN_OPEN) {
-        if (code == SIGN_OPEN) settle(&w, 0, limit);
-        if (move(&w) == SIGN_OPEN) settle(&w, 1, limit);
-        if (complete(&w, eps))
-            found = solve_programs(&w, ARRIVAL, 0, 2 * w.nt, limit);
-        else
-            code = OUTGROWN;
-    }
+    answer found;
+    const integer code = take(&w, eps, limit, &found);
     return code + 8 * (found.verdict + 4 * (found.program + 1));
 }
 

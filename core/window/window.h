@@ -265,6 +265,10 @@ entering avoid_small_pivot(const window *w, integer m, entering chosen);
 /* dual_simplex.c */
 integer maximise(const window *w, integer q, integer limit, double *bound);
 
+/* sample.c: a whole sample, whose data lie in in_*; `enter`, `move`, `complete`, CHANNELS where signs are open, and
+ * ARRIVAL. Returns what `enter` returns, or OUTGROWN. */
+integer take(const window *w, double eps, integer limit, answer *found);
+
 /* programs.c */
 answer solve_programs(const window *w, integer task, integer start, integer stop, integer limit);
 

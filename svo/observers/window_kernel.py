@@ -54,6 +54,9 @@ _enter = native.function("fdi_window_enter", Address, returns=Integer)
 _move = native.function("fdi_window_move", Address, returns=Integer)
 _complete = native.function("fdi_window_complete", Address, Real, returns=Integer)
 _take = native.function("fdi_window_take", Address, Real, Integer, returns=Integer)
+_follow = native.function(
+    "fdi_window_follow", Address, Integer, Integer, *[Address] * 7, Real, Integer, Address, Address, returns=Integer
+)
 _solve = native.function("fdi_window_solve", Address, Integer, Integer, Integer, Integer, returns=Integer)
 _arrival_programs = native.function("fdi_window_arrival_programs", Address, Address)
 _initialise = native.function("fdi_window_initialise", Address, Integer, Address, Address, Address)
@@ -121,8 +124,38 @@ def take(address: int, eps: float, limit: int) -> tuple[int, int, int]:
 
     Returns what `enter` returns, or OUTGROWN; the verdict; the program that found the window empty, or -1.
     """
-    found = _take(address, eps, limit)
+    return _told(_take(address, eps, limit))
+
+
+def _told(found: int) -> tuple[int, int, int]:
     return found & 7, found >> 3 & 3, (found >> 5) - 1
+
+
+def follow(
+    address: int, samples: tuple[Array, ...], eps: float, limit: int, boxes: Array | None
+) -> tuple[int, tuple[int, int, int]]:
+    """Samples of a log in turn, until one is not simply consistent, of which the caller concludes the rest.
+
+    Parameters
+    ----------
+    address : int
+    samples : tuple of arrays
+        C-contiguous floats in normal form: u, u_next (k, nu), y (k, ny); stack (k, ...) or (1, ...), noise, w_lower and
+        w_upper likewise.
+    eps, limit
+        As of `take`.
+    boxes : (k, 2, n) array, optional
+        Filled with the boxes of the samples that are consistent.
+
+    Returns
+    -------
+    How many those are, and what `take` says of the last sample that was taken.
+    """
+    result, to_boxes = np.zeros(1, dtype=np.int64), None if boxes is None else native.address(boxes)
+    addresses = [native.address(array) for array in samples]
+    count, is_scheduled = len(samples[0]), len(samples[3]) > 1
+    done = _follow(address, count, is_scheduled, *addresses, eps, limit, to_boxes, native.address(result))
+    return int(done), _told(int(result[0]))
 
 
 def enter(address: int) -> int:

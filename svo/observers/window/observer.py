@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
+from svo.logs.drive import advance_to
+from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel
 from svo.models.state_range import within
 from svo.observers import window_kernel as kernel
 from svo.observers.answers import VerdictName
-from svo.observers.base import Observer
+from svo.observers.base import Observer, Seen, Step
 from svo.observers.data import relative_slack
 from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
@@ -25,6 +28,7 @@ from svo.observers.given_units import arrival_in
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
 from svo.observers.saved_state import arrays_of, numbers
 from svo.observers.window.evidence import ArrivalSet
+from svo.observers.window.log_samples import LogSamples, log_samples
 from svo.observers.window.memory import WindowSettings
 from svo.observers.window.sample import Outgrown, Sample, check_matrices
 from svo.observers.window.setup import arrival_of, needs_next_input, template_rows
@@ -32,6 +36,8 @@ from svo.observers.window.step import WindowStep
 from svo.observers.window.window import Prover, Window
 
 _BLURRED = 1e-3  # of a reading's own width: the share of its slack by the width of the set from which a restart pays
+_BRIEF = 0.05  # seconds of a call of the kernel after which the next may take more samples: Ctrl-C waits for its end
+_MOST_AT_ONCE = 1024  # samples
 _LONGEST = 10  # samples without a sensor after which its return may call for one, where the window has no end
 
 
@@ -254,6 +260,56 @@ class WindowObserver(Observer):
         bounds = {part: numbers(state, f"{name}.{part}", size, infinite=True) for part, size in sizes.items()}
         return ArrivalSet(rows=numbers(state, f"{name}.rows", ends, n), **bounds)
 
+    # -- many samples at once ---------------------------------------------------------------------
+
+    def follow(self, log: Log, boxes: Array | None = None) -> Iterator[Seen]:
+        expect_log(log)
+        k, portion = 0, 1
+        while k < len(log):
+            begun = perf_counter()
+            samples = self._samples_at_once(log, k, portion)
+            if samples is None:
+                answers = [self._seen_alone(advance_to(self, log, k, log.schedule_at(k)), k, boxes)]
+            else:
+                answers = list(self._seen_at_once(log, k, samples, boxes))
+                portion = min(2 * portion, _MOST_AT_ONCE) if perf_counter() - begun < _BRIEF else -(-portion // 4)
+            for seen in answers:
+                k += seen.samples
+                yield seen
+
+    def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | None:
+        """Samples of a log for one call of the kernel; None where the next one needs more than that."""
+        gone = self._lost or self._alarm is not None or self._readings is not None or self._missing.any()
+        if gone or self._number != first - 1:
+            return None
+        last = min(first + min(count, self._window.takes_at_once), len(log))
+        return log_samples(self._form, log, first, last, self._wants_next_input)
+
+    def _seen_at_once(self, log: Log, first: int, samples: LogSamples, boxes: Array | None) -> Iterator[Seen]:
+        """Those that are consistent, then the one that is not, if there is one."""
+        begun, last = perf_counter(), first + len(samples.y)
+        own = None if boxes is None else boxes[first:last]
+        done, told = self._window.take_many(samples, own)
+        if own is not None:
+            own[:done] *= self._form.x
+        if done:
+            self._number += done
+            self._schedule = log.schedule_at(self._number)
+            step = self._answered(WindowStep(self, verdict="consistent"), begun)
+            yield Seen(done, replace(step, seconds=step.seconds / done))
+        at = first + done
+        if at < last:
+            sample = samples.one(done, log.y[at])
+            ended = lambda: self._window.concluded(told, sample.given)  # noqa: E731
+            step = self._ask(perf_counter(), log.schedule_at(at), lambda: self._said(self._outcome(sample, ended)))
+            yield self._seen_alone(step, at, boxes)
+
+    @staticmethod
+    def _seen_alone(step: Step, k: int, boxes: Array | None) -> Seen:
+        if boxes is not None:
+            boxes[k] = step.box
+        return Seen(1, step)
+
     # -- inside ----------------------------------------------------------------------------------
 
     def _sample(self, u: Array, u_next: Array, y: Array, schedule: Any) -> Sample:
@@ -266,8 +322,12 @@ class WindowObserver(Observer):
         if self._lost:
             check_matrices(sample.stack)
             return self._without_set(sample)
+        return self._outcome(sample, lambda: self._window.take(sample, end))
+
+    def _outcome(self, sample: Sample, take: Callable[[], VerdictName]) -> VerdictName:
+        """What becomes of a sample that the window takes."""
         try:
-            verdict = self._window.take(sample, end)
+            verdict = take()
         except Outgrown:
             return self._give_up(sample)
         return verdict if verdict == "falsified" else self._watch(sample, verdict)

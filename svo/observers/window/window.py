@@ -24,9 +24,13 @@ from svo.observers.saved_state import arrays_of, take_exactly
 from svo.observers.window.certificate import WindowCertificate, certificate_of
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.fallback import candidates, is_feasible
+from svo.observers.window.log_samples import LogSamples
 from svo.observers.window.memory import Memory, WindowSettings
 from svo.observers.window.sample import Outgrown, Sample, check_entry
 from svo.observers.window.sign_split import SplitCertificate, SplitPrograms
+
+Taken = tuple[int, int, int]
+"""What the kernel tells of a sample that it took: code, verdict, program that found the window empty."""
 
 _PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
 
@@ -111,21 +115,60 @@ class Window:
             If the newest state has no bounds of use.
         """
         memory, self.reason = self.memory, None
-        if self.settings.horizon is None and memory.started and memory.time + 1 >= memory.size.N:
+        if self._room == 0:
             memory = self._grow()
-        one_call = not self.settings.sign_split and self._injection is None
-        if one_call and end is None and self.prover is None:
+        if self._takes_whole and end is None:
             self._hand_over(sample)
-            code, found, program = kernel.take(memory.address, self.settings.eps, kernel.PIVOT_LIMIT)
-            check_entry(code)
-            self._given = sample.given
-            if code == kernel.OUTGROWN:
-                raise Outgrown
-            verdict = "consistent" if found == kernel.CONSISTENT else self._conclude(kernel.ARRIVAL, found, program)
-        else:
-            self._enter(sample, end)
-            verdict = self._decide(end)
+            told = kernel.take(memory.address, self.settings.eps, kernel.PIVOT_LIMIT)
+            return self.concluded(told, sample.given)
+        self._enter(sample, end)
+        return self._cut_arrival(self._decide(end))
+
+    def take_many(self, samples: LogSamples, boxes: Array | None) -> tuple[int, Taken]:
+        """The next samples, as many as are simply consistent; `concluded` says what became of the one after them.
+
+        Parameters
+        ----------
+        samples : LogSamples
+            No more than `takes_at_once` of them.
+        boxes : (k, 2, n) array, optional
+            Filled with the boxes of the states at the samples that are consistent.
+        """
+        self.reason = None
+        done, told = kernel.follow(self.memory.address, samples, self.settings.eps, kernel.PIVOT_LIMIT, boxes)
+        return done, told
+
+    @property
+    def takes_at_once(self) -> int:
+        """How many samples `take_many` may be given; 0 where each is more than one call of the kernel."""
+        return self._room if self._takes_whole and self._model.physical_range is None else 0
+
+    def concluded(self, told: Taken, given: Array) -> VerdictName:
+        """What the kernel told of a whole sample comes to, whose measurement was ``given`` in the user's units.
+
+        Raises
+        ------
+        ValueError, Outgrown
+            As `take`.
+        """
+        code, found, program = told
+        check_entry(code)
+        self._given = given
+        if code == kernel.OUTGROWN:
+            raise Outgrown
+        verdict = "consistent" if found == kernel.CONSISTENT else self._conclude(kernel.ARRIVAL, found, program)
         return self._cut_arrival(verdict)
+
+    @property
+    def _takes_whole(self) -> bool:
+        """Whether a sample is one call of the kernel."""
+        return not self.settings.sign_split and self._injection is None and self.prover is None
+
+    @property
+    def _room(self) -> int:
+        """Samples until the memory of a window that keeps all of them must grow."""
+        memory = self.memory
+        return memory.size.N - memory.time - 1 if self.settings.horizon is None and memory.started else memory.size.N
 
     def add_late(self, y: Array, sample: int) -> VerdictName:
         """A measurement of a sample that is still there."""
