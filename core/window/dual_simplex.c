@@ -61,19 +61,28 @@ static void primal_point(const window *w, integer q, integer k)
     add_rows(w->act, w->GT, cols, w->uk, k, w->R);
 }
 
+/* Violations of the rows, zero for active ones, and the largest, which is not negative. */
+static double violations(const window *w, integer q, integer k)
+{
+    const integer R = w->R, *rows = w->rows + q * w->K;
+    const double *restrict act = w->act, *restrict upper = w->upper, *restrict lower = w->lower;
+    double *restrict vio = w->vio, part[4] = {0.0, 0.0, 0.0, 0.0};
+    integer i = 0;
+    for (integer j = 0; j < R; j++) vio[j] = larger(lower[j] - act[j], act[j] - upper[j]);
+    for (integer a = 0; a < k; a++) vio[rows[a]] = 0.0;
+    for (; i + 4 <= R; i += 4)
+        for (int lane = 0; lane < 4; lane++) part[lane] = larger(vio[i + lane], part[lane]);
+    for (; i < R; i++) part[0] = larger(vio[i], part[0]);
+    return larger(larger(part[0], part[1]), larger(part[2], part[3]));
+}
+
 /* The row that violates its bounds most in the exact steepest-edge norm, among those within a share of the worst. */
 static leaving leaving_row(const window *w, integer q, integer k, double *best)
 {
-    const integer R = w->R, *rows = w->rows + q * w->K;
-    const double *act = w->act, *upper = w->upper, *lower = w->lower;
+    const double *vio = w->vio, worst = violations(w, q, k), threshold = larger(NEAR_WORST * worst, FEASIBILITY);
     leaving out = {-1, -1, 1.0, 0.0};
-    double *vio = w->vio, worst = 0.0;
-    for (integer i = 0; i < R; i++) vio[i] = larger(lower[i] - act[i], act[i] - upper[i]);
-    for (integer a = 0; a < k; a++) vio[rows[a]] = 0.0;
-    for (integer i = 0; i < R; i++) worst = larger(vio[i], worst);
     if (!(worst > FEASIBILITY)) return out;
-    const double threshold = larger(NEAR_WORST * worst, FEASIBILITY);
-    for (integer i = 0; i < R; i++) {
+    for (integer i = 0; i < w->R; i++) {
         if (!(vio[i] >= threshold)) continue;
         combine(w, q, k, w->G + i * w->Z, w->wk);
         const double norm = 1.0 + sum_of_squares(w->wk, k);
@@ -83,7 +92,7 @@ static leaving leaving_row(const window *w, integer q, integer k, double *best)
         }
     }
     if (out.row >= 0) {
-        out.side = act[out.row] > upper[out.row] ? 1.0 : -1.0;
+        out.side = w->act[out.row] > w->upper[out.row] ? 1.0 : -1.0;
         out.violation = vio[out.row];
     }
     return out;
@@ -107,7 +116,7 @@ static leaving choose_leaving(const window *w, integer q, integer k)
     return out;
 }
 
-/* alpha = row of the tableau over z, wk = the same over the active rows' bounds. */
+/* alpha = row of the tableau over z, zero for basic variables; wk = the same over the active rows' bounds. */
 static void tableau_row(const window *w, integer q, integer k, leaving out)
 {
     const integer Z = w->Z, K = w->K;
@@ -120,6 +129,7 @@ static void tableau_row(const window *w, integer q, integer k, leaving out)
     }
     for (integer a = 0; a < k; a++) w->uk[a] = -w->wk[a];
     add_rows(w->alpha, w->G, w->rows + q * K, w->uk, k, Z);
+    for (integer b = 0; b < k; b++) w->alpha[w->cols[q * K + b]] = 0.0;
 }
 
 /* The variable goes to its other bound, from its centre to the bound that the step likes; how far it moves. */
@@ -142,7 +152,7 @@ static void move_point(const window *w, integer q, integer k, entering in, doubl
     integer m = 0;
     fill(shift, 0.0, k);
     for (integer f = 0; f <= in.flips; f++) {
-        const integer who = w->candidate[f], is_last = f == in.flips;
+        const integer who = w->points[f].who, is_last = f == in.flips;
         if (who < Z) {
             const double dz = is_last ? -side * in.left / w->alpha[who]
                                       : flip_variable(w, w->status + q * Z + who, who, side);
@@ -178,8 +188,8 @@ static void store_farkas(const window *w, integer q, integer k, leaving out)
 /* One pivot: flips, the move, the dual step by theta, the new basis, whose size it returns. */
 static integer pivot(const window *w, integer q, integer k, leaving out, entering in)
 {
-    const integer enter = w->candidate[in.flips];
-    const double theta = w->ratio[in.flips];
+    const integer enter = w->points[in.flips].who;
+    const double theta = w->points[in.flips].ratio;
     move_point(w, q, k, in, out.side);
     if (theta != 0.0) {
         add_multiple(w->d, -theta * out.side, w->alpha, w->Z);
@@ -208,7 +218,7 @@ static integer optimise(const window *w, integer q, integer limit)
         }
         if (pivots >= limit || k + 1 >= w->K) break;
         tableau_row(w, q, k, out);
-        const integer m = collect_breakpoints(w, q, k, out.side);
+        const integer m = collect_breakpoints(w, q, k, out);
         const entering in = choose_entering(w, m, out.violation);
         if (in.flips < 0) {
             store_farkas(w, q, k, out);

@@ -5,9 +5,9 @@ enum { ALIGNMENT = 64, DIMENSIONS = 4, SIZE_COUNT = 13 };
 
 static integer rounded_up(integer bytes) { return (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT; }
 
-static integer bytes_of(const integer *lengths, integer count)
+static integer bytes_of(integer entry, const integer *lengths, integer count)
 {
-    integer bytes = 8; /* of a double and of an integer */
+    integer bytes = entry;
     for (integer i = 0; i < count; i++) bytes *= lengths[i];
     return rounded_up(bytes);
 }
@@ -25,12 +25,12 @@ void window_open(window *w, void *memory)
     {                                                                                                                \
         const integer lengths[] = {__VA_ARGS__};                                                                     \
         w->name = (type *)(void *)at;                                                                                \
-        at += bytes_of(lengths, sizeof lengths / sizeof *lengths);                                                   \
+        at += bytes_of(sizeof(type), lengths, sizeof lengths / sizeof *lengths);                                     \
     }
     ARRAYS(PLACE)
 }
 
-/* Where every array lies: use, kind (0 double, 1 integer), dimensions, four lengths and the offset in bytes.
+/* Where every array lies: use, kind, dimensions, four lengths and the offset in bytes.
  * Returns the bytes of the block; size (13,) as SIZES, table (arrays, 8). */
 EXPORTED integer fdi_window_layout(const integer *size, integer *table)
 {
@@ -42,11 +42,11 @@ EXPORTED integer fdi_window_layout(const integer *size, integer *table)
     {                                                                                                                \
         const integer lengths[] = {__VA_ARGS__}, count = sizeof lengths / sizeof *lengths;                           \
         *table++ = use;                                                                                              \
-        *table++ = (type)0.5 == 0;                                                                                   \
+        *table++ = KIND_##type;                                                                                      \
         *table++ = count;                                                                                            \
         for (integer i = 0; i < DIMENSIONS; i++) *table++ = i < count ? lengths[i] : 1;                              \
         *table++ = at;                                                                                               \
-        at += bytes_of(lengths, count);                                                                              \
+        at += bytes_of(sizeof(type), lengths, count);                                                                \
     }
     ARRAYS(LIST)
     return at;

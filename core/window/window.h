@@ -31,6 +31,11 @@ enum { ARRIVAL, NEWEST, CHANNELS, QUERY };         /* tasks */
 enum { FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE, OUTGROWN };  /* what came of a sample */
 enum { BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED, CLOCK }; /* entries of the clock */
 enum { SCRATCH, KEPT };                            /* whether an array is part of a saved window */
+enum { KIND_double, KIND_integer, KIND_breakpoint }; /* of the entries of an array */
+
+/* Of a dual step: the step at which a variable, or Z + the place of an active row, would be dual infeasible; the size
+ * of its entry in the row of the tableau; how much its flip takes of the violation. */
+typedef struct { double ratio, size, drop; integer who; } breakpoint;
 
 /* The sizes that a caller chooses: n states, nu inputs, nw disturbances, ny sensors, nq channels, nh rows on w, nt
  * directions of the template, na rows on the arrival state besides its box, ni items of a stack, N steps that the
@@ -148,9 +153,7 @@ enum { SCRATCH, KEPT };                            /* whether an array is part o
     Y(double, SCRATCH, wk, K)                                                                                        \
     Y(double, SCRATCH, uk, K)                                                                                        \
     Y(integer, SCRATCH, candidate, J)                                                                                \
-    Y(double, SCRATCH, ratio, J)                                                                                     \
-    Y(double, SCRATCH, pivot, J)                                                                                     \
-    Y(double, SCRATCH, drop, J)                                                                                      \
+    Y(breakpoint, SCRATCH, points, J)                                                                                \
     Y(integer, SCRATCH, chosen, J)                                                                                   \
     Y(double, SCRATCH, move, J)                                                                                      \
     Y(double, SCRATCH, table, K, L)                                                                                  \
@@ -258,7 +261,7 @@ void forget_basis(const window *w, integer q);
 void carry_basis(const window *w, integer q);
 
 /* ratio_test.c */
-integer collect_breakpoints(const window *w, integer q, integer k, double side);
+integer collect_breakpoints(const window *w, integer q, integer k, leaving out);
 entering choose_entering(const window *w, integer m, double violation);
 entering avoid_small_pivot(const window *w, integer m, entering chosen);
 

@@ -26,6 +26,8 @@ ARRIVAL, NEWEST, CHANNELS, QUERY = range(4)
 FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE, OUTGROWN = range(7)
 BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED = range(8)
 
+_BREAKPOINT = [("ratio", np.float64), ("size", np.float64), ("drop", np.float64), ("who", np.int64)]
+_KINDS = [np.dtype(np.float64), np.dtype(np.int64), np.dtype(_BREAKPOINT)]
 _ALIGNMENT = 64
 
 
@@ -98,10 +100,10 @@ class Block:
             self._bytes[:] = np.frombuffer(content, dtype=np.uint8)
         self.address = native.address(self._bytes)
         self.arrays: dict[str, NDArray[Any]] = {}
-        for name, (_, is_integer, dimensions, *lengths, offset) in zip(_NAMES, table.tolist(), strict=True):
-            shape = lengths[:dimensions]
-            part = self._bytes[offset : offset + 8 * int(np.prod(shape))]
-            self.arrays[name] = part.view(np.int64 if is_integer else np.float64).reshape(shape)
+        for name, (_, kind, dimensions, *lengths, offset) in zip(_NAMES, table.tolist(), strict=True):
+            shape, entry = lengths[:dimensions], _KINDS[kind]
+            part = self._bytes[offset : offset + entry.itemsize * int(np.prod(shape))]
+            self.arrays[name] = part.view(entry).reshape(shape)
         self.kept = tuple(name for name, kept in zip(_NAMES, table[:, 0], strict=True) if kept)
 
     def __reduce__(self) -> tuple[Any, ...]:
