@@ -198,9 +198,10 @@ static integer pivot(const window *w, integer q, integer k, leaving out, enterin
     return change_basis(w, q, k, out, enter, theta);
 }
 
-/* Bounded dual simplex from the basis of direction q; w->cost is maximised. Returns OPTIMAL, EMPTY or STOPPED. */
+/* Bounded dual simplex from the basis of direction q; w->cost is maximised. Returns the outcome. */
 static integer optimise(const window *w, integer q, integer limit)
 {
+    const integer without_room = w->clock[CAPPED] ? STOPPED : OVERFULL;
     integer k = w->k[q], since = 0, pivots = 0, outcome = STOPPED;
     price_out(w, q, k);
     primal_point(w, q, k);
@@ -216,7 +217,11 @@ static integer optimise(const window *w, integer q, integer limit)
             outcome = OPTIMAL;
             break;
         }
-        if (pivots >= limit || k + 1 >= w->K) break;
+        if (pivots >= limit) break;
+        if (k + 1 >= w->K) {
+            outcome = without_room;
+            break;
+        }
         tableau_row(w, q, k, out);
         const integer m = collect_breakpoints(w, q, k, out);
         const entering in = choose_entering(w, m, out.violation);
@@ -289,7 +294,7 @@ static integer optimise_patiently(const window *w, integer q, integer limit)
     if (outcome != STOPPED || limit <= LONG) return outcome;
     disturb_cost(w, LARGE_JITTER);
     outcome = optimise(w, q, limit - LONG);
-    if (outcome != EMPTY) {
+    if (outcome == OPTIMAL || outcome == STOPPED) {
         disturb_cost(w, 1.0);
         outcome = optimise(w, q, most(limit - (w->clock[PIVOTS] - begun), 0));
     }

@@ -18,21 +18,22 @@ static void give(const window *w, const samples *given, integer i)
     copy(w->in_w_upper, given->w_upper + at * w->nw, w->nw);
 }
 
-/* Bounds of the newest state along the axes, to row i of the boxes (count, 2, n). */
-static void store_box(const window *w, double *boxes, integer i, integer limit)
+/* Bounds of the newest state along the axes, to row i of the boxes (count, 2, n); 0 if a basis has no room. */
+static integer store_box(const window *w, double *boxes, integer i, integer limit)
 {
     answer found = {EMPTY_CANDIDATE, -1};
     while (found.verdict == EMPTY_CANDIDATE) /* of what no multipliers have proven empty every bound is asked for */
         found = solve_programs(w, NEWEST, found.program + 1, 2 * w->n, limit);
     copy(boxes + 2 * i * w->n, w->now_lower, w->n);
     copy(boxes + (2 * i + 1) * w->n, w->now_upper, w->n);
+    return found.verdict != FULL;
 }
 
 /* Take samples 0, 1, ... < count until one is not simply consistent, of which the caller concludes the rest.
  *
  * Arrays in normal form: u, u_next (count, nu), y (count, ny), stack (count or 1, ni, X, P), noise, w_lower, w_upper by
  * sample or once; boxes (count, 2, n) or NULL, filled for the samples that are consistent. Returns how many those
- * are; *result is what `fdi_window_take` says of the last one taken. */
+ * are; *result is what `fdi_window_take` says of the last one taken, which may need more room, or its box may. */
 EXPORTED integer fdi_window_follow(void *block, integer count, integer is_scheduled, const double *u,
                                    const double *u_next, const double *y, const double *stack, const double *noise,
                                    const double *w_lower, const double *w_upper, double eps, integer limit,
@@ -47,7 +48,7 @@ EXPORTED integer fdi_window_follow(void *block, integer count, integer is_schedu
         const integer code = take(&w, eps, limit, &found);
         *result = code + 8 * (found.verdict + 4 * (found.program + 1));
         if ((code != FINE && code != SIGN_OPEN) || found.verdict != CONSISTENT) return i;
-        if (boxes) store_box(&w, boxes, i, limit);
+        if (boxes && !store_box(&w, boxes, i, limit)) return i;
     }
     return count;
 }

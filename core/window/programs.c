@@ -135,7 +135,8 @@ static integer solve_program(const window *w, integer task, integer basis, integ
  *
  * ARRIVAL decides emptiness and, before a slide, bounds the state at base + block; NEWEST bounds the newest state in
  * the template's directions, QUERY in the one that was asked for; CHANNELS tightens the bounds of s that leave its
- * sign open. A program that is found empty ends them: its bound is stored all the same, the proof may not hold. */
+ * sign open. A program that is found empty, or needs a larger basis, ends them; its bound is stored all the same, for
+ * the proof may not hold and the room not be there. */
 answer solve_programs(const window *w, integer task, integer start, integer stop, integer limit)
 {
     const integer v = variables(w, w->clock[TIME]) * w->nq, nt = w->nt, nq = w->nq;
@@ -152,13 +153,14 @@ answer solve_programs(const window *w, integer task, integer start, integer stop
         }
         const integer outcome = solve_program(w, task, bases[task], program, limit);
         if (outcome == EMPTY) return (answer){EMPTY_CANDIDATE, program};
+        if (outcome == OVERFULL) return (answer){FULL, program};
         if (outcome == OPTIMAL) found.verdict = CONSISTENT;
     }
     if (task == ARRIVAL && w->clock[TIME] - w->clock[BASE] == w->N && stop >= count) w->clock[PENDING] = 1;
     return found;
 }
 
-/* `solve_programs`; returns verdict + 4 (program + 1), the program being the one that found the window empty. */
+/* `solve_programs`; returns verdict + 4 (program + 1). */
 EXPORTED integer fdi_window_solve(void *block, integer task, integer start, integer stop, integer limit)
 {
     window w;

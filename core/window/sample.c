@@ -120,16 +120,20 @@ static integer complete(const window *w, double eps)
     return is_bounded(w, k);
 }
 
-/* Tighten the bounds of those s whose sign is open. */
-static void settle(const window *w, integer reaching, integer limit)
+/* Tighten the bounds of those s whose sign is open, from program clock[NEXT] on; 0 if one needs a larger basis. */
+static integer settle(const window *w, integer reaching, integer limit)
 {
-    const integer k = w->clock[TIME];
-    for (integer q = 0; q < w->nq; q++) {
-        const integer at = variables(w, k) * w->nq + q;
-        if (reaches_output(w, k, q) != reaching || !(w->s_lower[at] < 0.0 && 0.0 < w->s_upper[at])) continue;
-        for (integer program = 2 * q; program < 2 * q + 2; program++)
-            solve_programs(w, CHANNELS, program, program + 1, limit);
+    const integer v = variables(w, w->clock[TIME]) * w->nq;
+    for (integer *next = &w->clock[NEXT]; *next < 2 * w->nq; ++*next) {
+        const integer q = *next / 2, is_open = w->s_lower[v + q] < 0.0 && 0.0 < w->s_upper[v + q];
+        if (*next % 2 == 0 && (reaches_output(w, w->clock[TIME], q) != reaching || !is_open)) {
+            ++*next; /* both programs of a channel, or none */
+            continue;
+        }
+        if (solve_programs(w, CHANNELS, *next, *next + 1, limit).verdict == FULL) return 0;
     }
+    w->clock[NEXT] = 0;
+    return 1;
 }
 
 EXPORTED integer fdi_window_enter(void *block)
@@ -153,19 +157,44 @@ EXPORTED integer fdi_window_complete(void *block, double eps)
     return complete(&w, eps);
 }
 
+/* `fdi_window_take`, from the stage at which the window waits for room; found is what ARRIVAL says. */
 integer take(const window *w, double eps, integer limit, answer *found)
 {
+    const answer full = {FULL, -1};
+    integer *stage = &w->clock[STAGE], code = FINE;
     *found = (answer){UNDECIDED, -1};
-    const integer code = enter(w);
-    if (code != FINE && code != SIGN_OPEN) return code;
-    if (code == SIGN_OPEN) settle(w, 0, limit);
-    if (move(w) == SIGN_OPEN) settle(w, 1, limit);
-    if (!complete(w, eps)) return OUTGROWN;
+    if (*stage == IDLE) {
+        code = enter(w);
+        if (code != FINE && code != SIGN_OPEN) return code;
+        *stage = ENTERED;
+        w->clock[NEXT] = code == SIGN_OPEN ? 0 : 2 * w->nq;
+    }
+    if (*stage == ENTERED) {
+        if (!settle(w, 0, limit)) {
+            *found = full;
+            return FINE;
+        }
+        code = move(w);
+        *stage = MOVED;
+        w->clock[NEXT] = code == SIGN_OPEN ? 0 : 2 * w->nq;
+    }
+    if (*stage == MOVED) {
+        if (!settle(w, 1, limit)) {
+            *found = full;
+            return FINE;
+        }
+        *stage = COMPLETED;
+        if (!complete(w, eps)) return OUTGROWN;
+    }
     *found = solve_programs(w, ARRIVAL, 0, 2 * w->nt, limit);
+    if (found->verdict != FULL) *stage = IDLE;
     return code;
 }
 
-/* A whole sample in one call. Returns its code + 8 (verdict + 4 (program + 1)), as `fdi_window_solve`. */
+/* A whole sample in one call: `enter`, `move`, `complete`, CHANNELS where signs are open, and ARRIVAL.
+ *
+ * Returns what `enter` returns, or OUTGROWN, + 8 (verdict + 4 (program + 1)), as `fdi_window_solve`. If the verdict is
+ * FULL the sample is half done: call again once the window has moved to a block with a larger K. */
 EXPORTED integer fdi_window_take(void *block, double eps, integer limit)
 {
     window w;

@@ -25,11 +25,12 @@
 #define UPWARD (1.0 + 1e-12) /* more than sums of nonnegative terms round */
 
 enum { AT_LOWER, AT_UPPER, BASIC, AT_CENTRE };     /* status of a variable */
-enum { OPTIMAL, EMPTY, STOPPED };                  /* outcome of a program */
-enum { CONSISTENT, EMPTY_CANDIDATE, UNDECIDED };   /* verdict of the programs of a task */
+enum { OPTIMAL, EMPTY, STOPPED, OVERFULL };        /* outcome of a program; OVERFULL: its basis needs more room */
+enum { CONSISTENT, EMPTY_CANDIDATE, UNDECIDED, FULL }; /* verdict of a task's programs; FULL: one is OVERFULL */
 enum { ARRIVAL, NEWEST, CHANNELS, QUERY };         /* tasks */
 enum { FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE, OUTGROWN };  /* what came of a sample */
-enum { BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED, CLOCK }; /* entries of the clock */
+enum { BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED, CAPPED, STAGE, NEXT, CLOCK };
+enum { IDLE, ENTERED, MOVED, COMPLETED };          /* stages of a sample that waits for room */
 enum { SCRATCH, KEPT };                            /* whether an array is part of a saved window */
 enum { KIND_double, KIND_integer, KIND_breakpoint }; /* of the entries of an array */
 
@@ -60,7 +61,8 @@ typedef struct { double ratio, size, drop; integer who; } breakpoint;
 /* Every array of a window, Y(type, use, name, lengths): its layout, its pointer and the name that Python knows it by
  * come from this list. */
 #define ARRAYS(Y)                                                                                                    \
-    /* base, newest sample, whether arrival bounds wait for the slide, whether there is a sample; counts */          \
+    /* base, newest sample, whether arrival bounds wait for the slide, whether there is a sample; counts; whether */ \
+    /* bases cannot have more room; stage of a sample that waits for it, and the channel program that does */        \
     Y(integer, KEPT, clock, CLOCK)                                                                                   \
     /* the program: rows of z, also by columns, their bounds, and 2 (sum |G| + |bound|) + 1 */                       \
     Y(double, KEPT, G, R, Z)                                                                                         \
@@ -190,7 +192,7 @@ typedef struct window {
 #undef LENGTH
 #undef POINTER
 
-typedef struct { integer verdict, program; } answer;       /* of a task; the program that found the window empty or -1 */
+typedef struct { integer verdict, program; } answer;       /* of a task; the program that ended it, or -1 */
 typedef struct { double constant, rounding; } objective;   /* of a cost over z: its value at z = 0, its rounding */
 typedef struct { double known, magnitude, centre, spread; } known_terms;
 typedef struct { integer row, position; double side, violation; } leaving;

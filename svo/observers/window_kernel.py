@@ -21,10 +21,10 @@ PIVOT_LIMIT = 10_000
 ALL = 1 << 60  # programs: more than any task has
 
 # As in `core/window/window.h`.
-CONSISTENT, EMPTY_CANDIDATE, UNDECIDED = range(3)
+CONSISTENT, EMPTY_CANDIDATE, UNDECIDED, FULL = range(4)
 ARRIVAL, NEWEST, CHANNELS, QUERY = range(4)
 FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE, OUTGROWN = range(7)
-BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED = range(8)
+BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED, CAPPED = range(9)
 
 _BREAKPOINT = [("ratio", np.float64), ("size", np.float64), ("drop", np.float64), ("who", np.int64)]
 _KINDS = [np.dtype(np.float64), np.dtype(np.int64), np.dtype(_BREAKPOINT)]
@@ -124,7 +124,8 @@ def initialise(address: int, rows: Array, lower: Array, upper: Array) -> None:
 def take(address: int, eps: float, limit: int) -> tuple[int, int, int]:
     """A whole sample in one call: `enter`, `move`, `complete`, CHANNELS where signs are open, and ARRIVAL.
 
-    Returns what `enter` returns, or OUTGROWN; the verdict; the program that found the window empty, or -1.
+    Returns what `enter` returns, or OUTGROWN; the verdict; the program that found the window empty, or -1. If the
+    verdict is FULL the sample is half done: it goes on with the next call, once the window is in a block of larger K.
     """
     return _told(_take(address, eps, limit))
 
@@ -187,7 +188,8 @@ def solve(address: int, task: int, start: int, stop: int, limit: int) -> tuple[i
 
     ARRIVAL decides emptiness and, before a slide, bounds the state at base + block; NEWEST bounds the newest state in
     the template's directions, QUERY in the one that was asked for; CHANNELS tightens the bounds of s that leave its
-    sign open. Returns the verdict, and the program that found the window empty or -1.
+    sign open. Returns the verdict, and the program that found the window empty or needs a basis larger than K (FULL),
+    or -1.
     """
     found = _solve(address, task, start, stop, limit)
     return found & 3, (found >> 2) - 1

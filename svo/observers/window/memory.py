@@ -16,8 +16,7 @@ from svo.observers.window.output_injection import OutputInjection, can_inject
 from svo.observers.window.setup import channel_owners, disturbance_rows, jitter, output_is_disturbed
 
 _GROWING_START = 16
-_LARGEST_BASIS = 128
-_LARGEST_GROWING_BASIS = 256
+_FIRST_BASIS = 32  # rows that a basis has room for at first; most stay far below
 _MOST_BYTES = 8 * 2**30
 
 
@@ -71,7 +70,7 @@ class WindowSettings:
 
 
 class Memory:
-    """The block of a window and its arrays by name, anchored at nothing yet.
+    """The block of a window and its arrays by name, anchored at nothing yet; it grows where a basis needs more room.
 
     Attributes
     ----------
@@ -86,7 +85,7 @@ class Memory:
         What the kernel takes.
     """
 
-    def __init__(self, settings: WindowSettings, anchor_rows: int, steps: int) -> None:
+    def __init__(self, settings: WindowSettings, anchor_rows: int, steps: int, basis: int = _FIRST_BASIS) -> None:
         model, owner, template = settings.form.model, settings.owner, settings.template
         n, nq, injection = model.n_states, len(owner), settings.injection
         nw = model.n_disturbances + (0 if injection is None else n)
@@ -94,10 +93,10 @@ class Memory:
         nv, nr = nw + nq, model.n_outputs + len(w_rows[0]) + 2 * nq
         na = max(len(template), anchor_rows)
         rows, columns = na + (steps + 1) * nr, n + (steps + 1) * nv
-        largest = _LARGEST_BASIS if settings.horizon is not None else _LARGEST_GROWING_BASIS
+        self.largest_basis = min(rows, columns) + 2
         self.size = kernel.Sizes(
             n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=nq, nh=len(w_rows[0]), nt=n + len(template), na=na,
-            ni=1 + len(model.uncertainties), N=steps, block=settings.block, K=min(rows, columns, largest) + 2,
+            ni=1 + len(model.uncertainties), N=steps, block=settings.block, K=min(self.largest_basis, basis),
             late=int(settings.output_is_disturbed),
         )  # fmt: skip
         self.block = _room_for(self.size)
@@ -115,7 +114,8 @@ class Memory:
         self.address, self.arrays = self.block.address, self.block.arrays | self.given
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"size": self.size, "block": self.block, "given": self.given}
+        names = ("size", "block", "given", "largest_basis")
+        return {name: getattr(self, name) for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__ |= state
@@ -152,8 +152,34 @@ class Memory:
 
     def copy_from(self, smaller: Memory) -> None:
         """What a smaller one holds whose samples have not wrapped around: every array is a leading block of its own."""
-        for name, small in smaller.kept.items():
-            self.arrays[name][tuple(slice(0, length) for length in small.shape)] = small
+        _copy_leading(smaller.kept, self.arrays)
+
+    # -- what the kernel does --------------------------------------------------------------------------
+
+    def take(self, eps: float) -> tuple[int, int, int]:
+        """`kernel.take`, with as much room for bases as it needs."""
+        while (found := kernel.take(self.address, eps, kernel.PIVOT_LIMIT))[1] == kernel.FULL:
+            self.enlarge(2 * self.size.K)
+        return found
+
+    def solve(self, task: int, start: int, stop: int, limit: int) -> tuple[int, int]:
+        """`kernel.solve`, with as much room for bases as it needs: programs before the one that needs it go again."""
+        while (found := kernel.solve(self.address, task, start, stop, limit))[0] == kernel.FULL:
+            self.enlarge(2 * self.size.K)
+        return found
+
+    def enlarge(self, basis: int) -> None:
+        """Room for larger bases; where the machine has none, programs stop at the largest that fit."""
+        smaller, self.size = self.block, self.size._replace(K=min(basis, self.largest_basis))
+        try:
+            _check_room(self.size)
+            self.block = kernel.allocate(self.size)
+        except (MemoryError, ValueError):
+            self.size = smaller.size
+            self.arrays["clock"][kernel.CAPPED] = 1
+            return
+        self._name_arrays()
+        _copy_leading(smaller.arrays, self.block.arrays)
 
     def check_clock(self) -> None:
         """Raise ValueError unless the clock is one, and whatever else the kernel takes for an index is one too."""
@@ -170,6 +196,12 @@ class Memory:
                 raise ValueError(f"{name} contains NaN")
 
 
+def _copy_leading(smaller: dict[str, NDArray[Any]], larger: dict[str, NDArray[Any]]) -> None:
+    """Copy every array to the leading block of one that is larger."""
+    for name, small in smaller.items():
+        larger[name][tuple(slice(0, length) for length in small.shape)] = small
+
+
 def _room_for(size: kernel.Sizes) -> kernel.Block:
     """The block of a window, or an error that names the horizon, also where the machine has no room for them."""
     _check_room(size)
@@ -180,9 +212,10 @@ def _room_for(size: kernel.Sizes) -> kernel.Block:
 
 
 def _check_room(size: kernel.Sizes) -> None:
-    """Refuse a window whose rows, which are kept twice, no machine could hold, before they are allocated."""
+    """Refuse a window whose rows, which are kept twice, and bases no machine could hold, before they are allocated."""
     nv, nr = size.nw + size.nq, size.ny + size.nh + 2 * size.nq
     needed = 16 * (size.N + 1) * nr * (size.n + (size.N + 1) * nv)
+    needed += 8 * (4 * size.nt + 2 * size.nq + 1) * size.K**2
     if needed > _MOST_BYTES:
         raise ValueError(
             f"horizon makes a window of {size.N:.3g} steps, whose rows take {needed / 2**30:.3g} GB; expected at most "

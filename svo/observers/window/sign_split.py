@@ -131,12 +131,12 @@ class SplitPrograms:
     """
 
     def __init__(self, memory: Memory, certificate: Callable[[], WindowCertificate], limit: int) -> None:
-        self._arrays, self._address, self._size = memory.arrays, memory.address, memory.size
+        self._memory, self._size = memory, memory.size
         self._certificate, self._limit = certificate, limit
         self._open = dict(self._open_channels())
-        self._saved = {name: self._arrays[name].copy() for name in _CHANGED}
+        self._saved = {name: self._memory.arrays[name].copy() for name in _CHANGED}
         slots = [k % (self._size.N + self._size.late) for k in range(memory.base, memory.time + 1)]
-        self._bounds = self._arrays["s_lower"][slots].copy(), self._arrays["s_upper"][slots].copy()
+        self._bounds = self._memory.arrays["s_lower"][slots].copy(), self._memory.arrays["s_upper"][slots].copy()
 
     @property
     def is_needed(self) -> bool:
@@ -165,7 +165,7 @@ class SplitPrograms:
                 low, high = self._open[k, q]
                 waiting = [cell | {(k, q): (low, 0.0)}, cell | {(k, q): (0.0, high)}]
         self._apply({})
-        self._arrays["seen_base"][:] = -1
+        self._memory.arrays["seen_base"][:] = -1
         if heap:
             return SplitResult(-heap[0][0], has_point, None)
         return SplitResult(-np.inf, False, SplitCertificate(tuple(proofs), *self._bounds))
@@ -174,19 +174,19 @@ class SplitPrograms:
         self, task: int, program: int, cell: Cell, bound: Callable[[], float]
     ) -> tuple[int, float, tuple[int, int] | None]:
         self._apply(cell)
-        self._arrays["seen_base"][:] = -1  # the bases are those of other rows
-        verdict, _ = kernel.solve(self._address, task, program, program + 1, kernel.PIVOT_LIMIT)
+        self._memory.arrays["seen_base"][:] = -1  # the bases are those of other rows
+        verdict, _ = self._memory.solve(task, program, program + 1, kernel.PIVOT_LIMIT)
         branch = self._most_violated(cell) if verdict == kernel.CONSISTENT else self._widest(cell)
         return verdict, bound(), branch
 
     def _apply(self, cell: Cell) -> None:
         for name, array in self._saved.items():
-            self._arrays[name][...] = array
+            self._memory.arrays[name][...] = array
         for (k, q), (low, high) in cell.items():
-            kernel.redraw_channel(self._address, k, q, low, high)
+            kernel.redraw_channel(self._memory.address, k, q, low, high)
 
     def _open_channels(self) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
-        arrays, size = self._arrays, self._size
+        arrays, size = self._memory.arrays, self._size
         nr = size.ny + size.nh + 2 * size.nq
         for k in range(int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME]) + size.late):
             v = k % (size.N + size.late)
@@ -203,8 +203,8 @@ class SplitPrograms:
 
     def _most_violated(self, cell: Cell) -> tuple[int, int] | None:
         """The open channel whose p at the maximiser misses every Delta s the most; None if none does."""
-        arrays, size = self._arrays, self._size
-        n, nw, nv, z = size.n, size.nw, size.nw + size.nq, self._arrays["z"]
+        arrays, size = self._memory.arrays, self._size
+        n, nw, nv, z = size.n, size.nw, size.nw + size.nq, self._memory.arrays["z"]
         x, worst, found = arrays["xc"] + arrays["xr"] * z[:n], _INEXACT, None
         for k in range(int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME]) + 1):
             s, v = k % (size.N + 1), k % (size.N + size.late)

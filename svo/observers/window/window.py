@@ -119,8 +119,7 @@ class Window:
             memory = self._grow()
         if self._takes_whole and end is None:
             self._hand_over(sample)
-            told = kernel.take(memory.address, self.settings.eps, kernel.PIVOT_LIMIT)
-            return self.concluded(told, sample.given)
+            return self.concluded(memory.take(self.settings.eps), sample.given)
         self._enter(sample, end)
         return self._cut_arrival(self._decide(end))
 
@@ -134,9 +133,9 @@ class Window:
         boxes : (k, 2, n) array, optional
             Filled with the boxes of the states at the samples that are consistent.
         """
-        self.reason = None
-        done, told = kernel.follow(self.memory.address, samples, self.settings.eps, kernel.PIVOT_LIMIT, boxes)
-        return done, told
+        memory, eps, self.reason = self.memory, self.settings.eps, None
+        done, told = kernel.follow(memory.address, samples, eps, kernel.PIVOT_LIMIT, boxes)
+        return done, memory.take(eps) if told[1] == kernel.FULL else told
 
     @property
     def takes_at_once(self) -> int:
@@ -250,6 +249,9 @@ class Window:
 
     def resume(self, state: Mapping[str, NDArray], falsified: bool) -> None:
         """Take back the memory that `state` gave; ValueError unless it is one, and its falsification proven again."""
+        basis = state["inverse"].shape[-1]
+        if self.memory.size.K < basis <= self.memory.largest_basis:
+            self.memory.enlarge(basis)
         take_exactly(self.memory.kept, state)
         self.memory.check_clock()
         if falsified:
@@ -263,7 +265,7 @@ class Window:
 
     def _grow(self) -> Memory:
         smaller = self.memory
-        larger = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N)
+        larger = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N, smaller.size.K)
         larger.copy_from(smaller)
         self.memory = larger
         return larger
@@ -282,24 +284,24 @@ class Window:
             w = sample.w_lower, sample.w_upper
             stack, y, noise, injected = self._injection.transform(sample.stack, sample.y, w)
             entered = sample._replace(stack=stack, y=y, noise=noise)
-        address, is_first = self.memory.address, not self.memory.started
+        memory, is_first = self.memory, not self.memory.started
         self._hand_over(entered)
-        code = kernel.enter(address)
+        code = kernel.enter(memory.address)
         check_entry(code)
         self._given = sample.given
         self._settle_channels(code == kernel.SIGN_OPEN, False, is_first, end)
-        code = kernel.move(address)
-        arrays, s = self.memory.arrays, self.memory.slot
+        code, s = kernel.move(memory.address), memory.slot
         if self._injection is not None:
+            arrays = memory.given
             arrays["given.stack"][s], arrays["given.y"][s] = sample.stack, sample.y
             arrays["given.injected"][s], arrays["given.slack"][s] = injected, 0.0
         self._settle_channels(code == kernel.SIGN_OPEN, True, is_first, end)
         if injected:
             self._widen(sample)
-        if not kernel.complete(address, self.settings.eps):
+        if not kernel.complete(memory.address, self.settings.eps):
             raise Outgrown
         if self._injection is not None and not injected:
-            arrays["given.slack"][s] = arrays["slack"][s]
+            memory.given["given.slack"][s] = memory.arrays["slack"][s]
 
     def _widen(self, sample: Sample) -> None:
         """Bounds of what the injection leaves to the state and to the box of w, by what is known of the state."""
@@ -321,6 +323,7 @@ class Window:
         gain = arrays["gain"][v][:, self._model.n_states :]
         for q in np.flatnonzero(gain.any(axis=1) == reaching).tolist():
             for side in range(2):
+                arrays = self.memory.arrays  # a program may have moved them
                 is_open = sign_open and arrays["s_lower"][v, q] < 0.0 < arrays["s_upper"][v, q]
                 if is_open:
                     self._solve_one(kernel.CHANNELS, 2 * q + side, end)
@@ -349,7 +352,7 @@ class Window:
             split = SplitPrograms(memory, self.certificate, self.settings.sign_split)
             if split.is_needed:
                 return self._solve_split(split, task)
-        verdict, program = kernel.solve(memory.address, task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
+        verdict, program = memory.solve(task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
         return self._conclude(task, verdict, program)
 
     def _decide(self, end: float | None) -> VerdictName:
@@ -378,7 +381,7 @@ class Window:
             if task == kernel.ARRIVAL and self._prove():
                 return "falsified"
             after = program + 1
-            verdict, program = kernel.solve(memory.address, task, after, kernel.ALL, kernel.PIVOT_LIMIT)
+            verdict, program = memory.solve(task, after, kernel.ALL, kernel.PIVOT_LIMIT)
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
@@ -389,26 +392,25 @@ class Window:
         while True:
             over = end is None or perf_counter() >= end or done >= kernel.PIVOT_LIMIT
             portion = kernel.PIVOT_LIMIT if end is None else 0 if over else _PIVOTS_BETWEEN_LOOKS
-            verdict, _ = kernel.solve(memory.address, task, program, program + 1, portion)
+            verdict, _ = memory.solve(task, program, program + 1, portion)
             if over or verdict != kernel.UNDECIDED:
                 return int(verdict)
             done += portion
 
     def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
         """As `solve`, each program over its cells."""
-        arrays, address = self.memory.arrays, self.memory.address
-        fixed = {kernel.NEWEST: range(2 * self.memory.size.nt), kernel.QUERY: range(1)}
-        programs = fixed.get(task) or kernel.arrival_programs(address)
+        memory = self.memory
+        fixed = {kernel.NEWEST: range(2 * memory.size.nt), kernel.QUERY: range(1)}
         prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
         has_point = False
-        for program in programs:
+        for program in fixed.get(task) or kernel.arrival_programs(memory.address):
             sign = 1.0 - 2.0 * (program % 2)
-            target = arrays["answer"] if prefix is None else arrays[f"{prefix}_{'lower' if program % 2 else 'upper'}"]
+            name = "answer" if prefix is None else f"{prefix}_{'lower' if program % 2 else 'upper'}"
             at = 0 if prefix is None else program // 2
-            result = split.solve(task, program, lambda t=target, i=at, s=sign: float(s * t[i]))  # type: ignore[misc]
+            result = split.solve(task, program, lambda t=name, i=at, s=sign: float(s * memory.arrays[t][i]))  # type: ignore[misc]
             has_point = has_point or result.has_point
             if result.proof is None:
-                target[at] = sign * result.value
+                memory.arrays[name][at] = sign * result.value
             elif task == kernel.ARRIVAL and result.proof.verify():
                 self.proof = result.proof
                 return "falsified"
