@@ -30,6 +30,10 @@ typedef int64_t integer;
 
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
+static inline double clipped(double value, double lower, double upper) /* NaN stays */
+{
+    return value < lower ? lower : value > upper ? upper : value;
+}
 static inline integer least(integer a, integer b) { return a < b ? a : b; }
 static inline integer most(integer a, integer b) { return a > b ? a : b; }
 

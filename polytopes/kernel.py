@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes.native import Address, Array, Integer, Real, floats, function, scratch
+from polytopes.native import Address, Entries, Integer, Real, floats, function, scratch
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -27,17 +27,17 @@ def _room(name: str, sizes: int) -> Any:
     return lru_cache(1024)(function(f"fdi_{name}_room", *[Integer] * sizes, returns=Integer))
 
 
-_interior = function("fdi_interior", *[Integer] * 2, *[Array] * 4, Real, Array, Address, returns=Integer)
+_interior = function("fdi_interior", *[Integer] * 2, *[Entries] * 4, Real, Entries, Address, returns=Integer)
 _interior_room = _room("interior", 2)
-_supports = function("fdi_supports", *[Integer] * 3, *[Array] * 6, Address)
+_supports = function("fdi_supports", *[Integer] * 3, *[Entries] * 6, Address)
 _supports_room = _room("supports", 3)
-_irredundant = function("fdi_irredundant", *[Integer] * 2, *[Array] * 5, Address, returns=Integer)
+_irredundant = function("fdi_irredundant", *[Integer] * 2, *[Entries] * 5, Address, returns=Integer)
 _irredundant_room = _room("irredundant", 2)
-_eliminate = function("fdi_eliminate", *[Integer] * 3, *[Array] * 10, returns=Integer)
+_eliminate = function("fdi_eliminate", *[Integer] * 3, *[Entries] * 10, returns=Integer)
 _eliminate_room = _room("eliminate", 2)
-_exponents = function("fdi_exponents", *[Integer] * 2, *[Array] * 4, Address)
+_exponents = function("fdi_exponents", *[Integer] * 2, *[Entries] * 4, Address)
 _exponents_room = _room("exponents", 2)
-_scaled = function("fdi_scaled", *[Integer] * 2, *[Array] * 4, Address, returns=Integer)
+_scaled = function("fdi_scaled", *[Integer] * 2, *[Entries] * 4, Address, returns=Integer)
 _scaled_room = _room("scaled", 2)
 
 

@@ -1,7 +1,7 @@
 """The compiled core: one shared library (`core/`, C99), called without Python's headers and with the GIL released.
 
-A function is declared once, with the kinds of its arguments. An array is given as it is (`Array`: C-contiguous, of the
-type that the function expects), or by an address, and then whoever calls keeps it alive for the time of the call.
+A function is declared once, with the kinds of its arguments. An array is given as it is (`Entries`: C-contiguous, of
+the type that the function expects), or by an address, and then whoever calls keeps it alive for the time of the call.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Real = ctypes.c_double
 _bytes = (ctypes.c_char * 0).from_buffer  # a quarter of the time of the array's own interface
 
 
-class Array:
+class Entries:
     """The kind of an argument that is an array, which may be read-only."""
 
     @staticmethod
@@ -53,7 +53,7 @@ _library = _load()
 
 
 def function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., Any]:
-    """A function of the core by its name, and its result; kinds are `Array`, `Address`, `Integer` and `Real`."""
+    """A function of the core by its name, and its result; kinds are `Entries`, `Address`, `Integer` and `Real`."""
     found = _library[name]  # one of its own: by attribute, all who ask share one and its kinds
     found.argtypes, found.restype = arguments, returns
     return found

@@ -1,4 +1,4 @@
-"""Nonlinear longitudinal flight of the Eclipse: compiled dynamics and closed-loop runs.
+"""Nonlinear longitudinal flight of the Eclipse: dynamics and closed-loop runs.
 
 The paper prints neither X, Z nor M. This surrogate is identified from its derivatives, so that its trim
 and its linearisation reproduce them: it is consistent with the published derivatives, it is not the real
@@ -15,8 +15,7 @@ With V^2 = u^2 + w^2, alpha = atan2(w, u), qhat = q c / (2 V), Q = rho V^2 S / 2
 and equation (14) of Rosa and Silvestre (2013) for theta, the distance p_N and the height h, with the sign
 of q u corrected. The elevator zero cannot be identified from derivatives; Cm0 = 0 fixes it.
 
-All compiled functions stand in this one file and take their constants as arguments: a cached machine code
-does not notice a change in another file.
+`simulator.c` beside this file computes them; it takes all constants from here.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass, fields
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from aircraft.eclipse.derivatives import (
@@ -37,10 +35,12 @@ from aircraft.eclipse.derivatives import (
     WING_AREA,
     Derivatives,
 )
+from polytopes.native import Entries, Integer, Real, floats, function
 
 Array = NDArray[np.float64]
 
-SUBSTEPS = 2
+_derivative = function("fdi_eclipse_derivative", *[Entries] * 5)
+_fly = function("fdi_eclipse_fly", Integer, Real, *[Entries] * 12)
 
 
 @dataclass(frozen=True)
@@ -70,17 +70,16 @@ class Surrogate:
         return AIR_DENSITY * WING_AREA * CHORD**2 * self.Cmad / (4 * PITCH_INERTIA)
 
     def packed(self) -> Array:
-        """Everything that the compiled functions need; they read no constant of another file (see above)."""
+        """Everything that the compiled functions need, in their order."""
         force, moment = AIR_DENSITY * WING_AREA / (2 * MASS), AIR_DENSITY * WING_AREA * CHORD / (2 * PITCH_INERTIA)
         thrust, thrust_moment = PUBLISHED["X_tau"][2], PUBLISHED["M_tau"][2]
         return np.array([*astuple(self), self.M_wdot, force, moment, CHORD / 2, GRAVITY, thrust, thrust_moment])
 
     def derivative(self, x: ArrayLike, u: ArrayLike, d: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """d/dt [u, w, theta, q] at state x (4,), input [eta deg, tau] and disturbance [d_u, d_w, d_q]."""
-        state = np.zeros(6)
-        state[:4] = np.asarray(x, dtype=float)
-        out = np.empty(6)
-        _derivative(state, np.asarray(u, dtype=float), np.asarray(d, dtype=float), np.zeros(5), self.packed(), out)
+        state, out = np.zeros(6), np.empty(6)
+        state[:4] = x
+        _derivative(self.packed(), state, floats(u), floats(d), out)
         return out[:4]
 
 
@@ -167,71 +166,19 @@ def fly(
         If the arrays differ in length, or the state leaves the finite numbers.
     """
     samples = len(disturbance)
-    superposed = np.zeros((samples, 2)) if excitation is None else np.ascontiguousarray(excitation, dtype=float)
-    gusts, errors = np.ascontiguousarray(disturbance), np.ascontiguousarray(noise)  # one layout: compiled once
-    arrays = (gusts, errors, superposed, corruption.bias, corruption.effectiveness, corruption.moment)
+    superposed = np.zeros((samples, 2)) if excitation is None else excitation
+    given = (disturbance, noise, superposed, corruption.bias, corruption.effectiveness, corruption.moment)
+    arrays = [floats(array) for array in given]
     names = ("disturbance", "noise", "excitation", "corruption.bias", "corruption.effectiveness", "corruption.moment")
     expected = ((samples, 3), (samples, 4), (samples, 2), (samples, 4), (samples, 2), (samples,))
     for name, array, shape in zip(names, arrays, expected, strict=True):
         if array.shape != shape:
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, one row a sample of disturbance")
     x, u, y = np.zeros((samples, 6)), np.zeros((samples, 2)), np.zeros((samples, 4))
-    x[0, :4] = np.asarray(x0, dtype=float)
-    law = tuple(np.ascontiguousarray(getattr(controller, f.name)) for f in fields(Controller))
+    x[:1, :4] = x0
+    law = np.concatenate([np.ravel(getattr(controller, f.name)) for f in fields(Controller)])
     speed_moment = np.array([*Derivatives().polynomials["M_u"], corruption.moment_reference])
-    _fly(x, u, y, *arrays, speed_moment, law, surrogate.packed(), Ts)
+    _fly(samples, Ts, surrogate.packed(), speed_moment, law, *arrays, x, u, y)
     if not np.isfinite(x).all():
         raise ValueError("the simulated state is no longer finite; start closer to a trim between 25 and 55 m/s")
     return Flight(x, u, y)
-
-
-@njit(cache=True)
-def _derivative(x, u, d, speed_moment, p, out):  # type: ignore[no-untyped-def]
-    """Right-hand side; speed_moment = [M_u polynomial (3), reference u, relative increase]."""
-    CL0, CLa, CLe, CD0, k, CDe, k_r, Cma, Cmq, _, Cme, coupling, M_wdot, force, torque, half_chord, g, X_tau, M_tau = p
-    speed_squared = x[0] * x[0] + x[1] * x[1]
-    speed = np.sqrt(speed_squared)
-    alpha, sine, cosine = np.arctan2(x[1], x[0]), x[1] / speed, x[0] / speed
-    lift = CL0 + CLa * alpha + CLe * u[0]
-    drag = CD0 + k * lift * lift + CDe * u[0]
-    moment = Cma * alpha + Cmq * x[3] * half_chord / speed + Cme * u[0]
-    aero_x, aero_z = lift * sine - drag * cosine, -lift * cosine - drag * sine
-    out[0] = force * speed_squared * aero_x + X_tau * u[1] - k_r * x[0] - g * np.sin(x[2]) - x[3] * x[1] + d[0]
-    out[1] = force * speed_squared * aero_z + g * np.cos(x[2]) + coupling * x[3] * x[0] + d[1]
-    out[2] = x[3]
-    out[3] = torque * speed_squared * moment + M_tau * u[1] + M_wdot * out[1] + d[2]
-    M_u = (speed_moment[0] * speed + speed_moment[1]) * speed + speed_moment[2]
-    out[3] += speed_moment[4] * M_u * (x[0] - speed_moment[3])
-    out[4] = x[0] * np.cos(x[2]) + x[1] * np.sin(x[2])
-    out[5] = x[0] * np.sin(x[2]) - x[1] * np.cos(x[2])
-
-
-@njit(cache=True)
-def _advance(x, u, d, speed_moment, p, Ts, out):  # type: ignore[no-untyped-def]
-    """One sample of RK4 with everything but the state held."""
-    h = Ts / SUBSTEPS
-    k1, k2, k3, k4 = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    out[:] = x
-    for _ in range(SUBSTEPS):
-        _derivative(out, u, d, speed_moment, p, k1)
-        _derivative(out + 0.5 * h * k1, u, d, speed_moment, p, k2)
-        _derivative(out + 0.5 * h * k2, u, d, speed_moment, p, k3)
-        _derivative(out + h * k3, u, d, speed_moment, p, k4)
-        out += (h / 6) * (k1 + 2 * k2 + 2 * k3 + k4)
-
-
-@njit(cache=True)
-def _fly(x, u, y, disturbance, noise, excitation, bias, effectiveness, moment, speed_moment, law, p, Ts):  # type: ignore[no-untyped-def]
-    A, B, C, M, K, u_trim, y_trim, lower, upper = law
-    predicted = np.zeros(4)
-    increase = np.zeros(5)
-    increase[:4] = speed_moment
-    for k in range(len(x)):
-        true_output = np.array([np.hypot(x[k, 0], x[k, 1]), np.arctan2(x[k, 1], x[k, 0]), x[k, 2], x[k, 3]])
-        y[k] = true_output + noise[k] + bias[k]
-        estimate = predicted + M @ (y[k] - y_trim - C @ predicted)
-        u[k] = np.minimum(np.maximum(u_trim - K @ estimate + excitation[k], lower), upper)
-        predicted = A @ estimate + B @ (u[k] - u_trim)
-        if k + 1 < len(x):
-            increase[4] = moment[k]
-            _advance(x[k], effectiveness[k] * u[k], disturbance[k], increase, p, Ts, x[k + 1])

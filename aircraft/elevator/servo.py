@@ -1,4 +1,4 @@
-"""Nonlinear servo-loop of an elevator: compiled dynamics and runs (paper 001, equations (1) and (2), corrected).
+"""Nonlinear servo-loop of an elevator: dynamics and runs (paper 001, equations (1) and (2), corrected).
 
     dx/dt = gamma(u, x) (u - x)
     gamma = k sqrt((1 - F sign(u - x)) / (1 + Ka (k (u - x))^2)),   k = Kci K
@@ -6,8 +6,7 @@
 Everything is normalised by S dPref. The paper prints the force F without a sign; it must oppose the motion one way and
 assist it the other. No values are public: those here are plausible, and no aircraft's.
 
-All compiled functions stand in this one file and take their constants as arguments: a cached machine code does not
-notice a change in another file.
+`servo.c` beside this file computes them; it takes all constants from here.
 """
 
 from __future__ import annotations
@@ -15,14 +14,15 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.native import Entries, Integer, Real, floats, function
 from svo.faults import ActuatorLaw
 
 Array = NDArray[np.float64]
 
-SUBSTEPS = 10
+_rate = function("fdi_servo_rate", Entries, Real, Real, Real, returns=Real)
+_run = function("fdi_servo_run", Entries, Integer, Real, *[Entries] * 4)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Servo:
 
     def rate(self, u: float, x: float, t: float) -> float:
         """gamma [1/s] with the force at time t [s]."""
-        return float(_rate(float(u), float(x), float(t), self._packed()))
+        return float(_rate(self._packed(), u, x, t))
 
     def run(
         self,
@@ -101,7 +101,7 @@ class Servo:
         ValueError
             For commands that are not finite, a start beyond the stops, or laws of another length.
         """
-        commands = np.ascontiguousarray(u, dtype=float)
+        commands = floats(u)
         if commands.ndim != 1 or not np.isfinite(commands).all():
             raise ValueError(f"u has shape {commands.shape}; expected (K,) finite commands in radians")
         if not abs(x0) <= self.stop:
@@ -109,7 +109,7 @@ class Servo:
         followed, taken = _rows("command", command, commands.size), _rows("surface", surface, commands.size)
         x = np.empty(commands.size)
         x[:1] = x0
-        _run(x, commands, followed, taken, Ts, self._packed())
+        _run(self._packed(), commands.size, Ts, commands, followed, taken, x)
         return x
 
     def _packed(self) -> Array:
@@ -123,38 +123,4 @@ def _rows(name: str, law: ActuatorLaw | None, samples: int) -> Array:
     rows = np.column_stack([law.gain, law.hold, law.offset, law.lower, law.upper])
     if len(rows) != samples:
         raise ValueError(f"{name} has {len(rows)} rows; expected {samples}, one a sample of u")
-    return np.ascontiguousarray(rows)
-
-
-@njit(cache=True)
-def _rate(u, x, t, p):  # type: ignore[no-untyped-def]
-    gain, damping, force, slope, swing, period = p[0], p[1], p[2], p[3], p[4], p[5]
-    load = (force + slope * x) * (1.0 + swing * np.sin(2.0 * np.pi * t / period))
-    move = gain * (u - x)
-    return gain * np.sqrt((1.0 - load * np.sign(u - x)) / (1.0 + damping * move * move))
-
-
-@njit(cache=True)
-def _law(row, value, held):  # type: ignore[no-untyped-def]
-    return min(max(row[0] * value + row[1] * held + row[2], row[3]), row[4])
-
-
-@njit(cache=True)
-def _run(x, u, command, surface, Ts, p):  # type: ignore[no-untyped-def]
-    """Fill x from its first entry. Over a substep gamma is held, so that the loop cannot overshoot its command."""
-    h, stop = Ts / SUBSTEPS, p[6]
-    held_command, held_position = u[0], x[0]
-    for k in range(x.size):
-        if k > 0:
-            free = x[k - 1]
-            target = _law(command[k - 1], u[k - 1], held_command)
-            for i in range(SUBSTEPS):
-                gamma = _rate(target, free, ((k - 1) + i / SUBSTEPS) * Ts, p)
-                free += (1.0 - np.exp(-gamma * h)) * (target - free)
-                free = min(max(free, -stop), stop)
-            x[k] = free
-        if surface[k, 1] == 0.0:
-            held_position = x[k]
-        if command[k, 1] == 0.0:
-            held_command = u[k]
-        x[k] = min(max(_law(surface[k], x[k], held_position), -stop), stop)
+    return floats(rows)

@@ -1,4 +1,4 @@
-"""Closed-loop flight of the missile, compiled: dynamics, target, guidance, autopilot, delayed measurements.
+"""Closed-loop flight of the missile: dynamics, target, guidance, autopilot, delayed measurements.
 
 Equations (1) to (4) of Marzat et al. (SysTol 2010), with corrections: the IMU measures the non-gravitational
 acceleration, a_b = f_aero / m, so that dv/dt = a_b + f_g / m - omega x v; the moments are Q s_ref l_ref (L, M, N).
@@ -11,8 +11,7 @@ of sight, plus the compensation of gravity. The autopilot inverts the trim: it f
 commanded acceleration with the moments balanced, commands an angular rate towards it, and inverts the moment
 equations (2) for the deflections.
 
-All compiled functions stand in this one file and take their constants as arguments: a cached machine code does
-not notice a change in another file.
+`simulator.c` and `autopilot.c` beside this file compute them; they take all constants from here.
 """
 
 from __future__ import annotations
@@ -20,15 +19,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from aircraft.missile.airframe import INPUT_LOWER, INPUT_UPPER, Airframe
+from polytopes.native import Entries, Integer, Real, address, floats, function
 
 Array = NDArray[np.float64]
 
 N_MEASUREMENTS = 15
 ACCELERATION, RATES, POSITION, VELOCITY, ANGLES = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
+_coefficients = function("fdi_missile_coefficients", Entries, Integer, *[Entries] * 3)
+_pressure = function("fdi_missile_pressure", Entries, Integer, *[Entries] * 3)
+_specific_force = function("fdi_missile_specific_force", *[Entries] * 4)
+_rotation = function("fdi_missile_rotation", *[Entries] * 2)
+_derivative = function("fdi_missile_derivative", *[Entries] * 4)
+_fly = function("fdi_missile_fly", *[Integer] * 2, Real, *[Entries] * 5)
 START = np.array([0.0, 0.0, -4000.0, 600.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.05])
 
 
@@ -161,209 +166,57 @@ def fly(
     x, acceleration = np.zeros((samples, 12)), np.zeros((samples, 3))
     computed, achieved, y = np.zeros((samples, 4)), np.zeros((samples, 4)), np.zeros((samples, N_MEASUREMENTS))
     target = np.zeros((samples, 3))
-    x[0] = start
-    faults = tuple(np.ascontiguousarray(v) for v in vars(corruption).values())
-    limits = (INPUT_LOWER, INPUT_UPPER)
-    gains = np.array(list(vars(guidance).values()))
-    believed = (airframe if model is None else model).packed()
+    x[:1] = start
     out = (x, acceleration, computed, achieved, y, target)
-    _fly(out, error, scale, delay, faults, limits, gains, airframe.packed(), believed, Ts)
+    given = [floats(array) for array in (error, scale, *vars(corruption).values())]
+    addresses = np.array([address(array) for array in (*out, *given)])
+    limits, gains = np.array([INPUT_LOWER, INPUT_UPPER]), np.array(list(vars(guidance).values()))
+    believed = airframe if model is None else model
+    _fly(samples, delay, Ts, airframe.packed(), believed.packed(), gains, limits, addresses)
     if not np.isfinite(x).all():
         raise ValueError("the simulated state is no longer finite: the flight was lost; end the run earlier")
     return Flight(*out)
 
 
-@njit(cache=True)
-def force_coefficients(alpha, beta, p):  # type: ignore[no-untyped-def]
-    """Coefficients of equation (1) at one incidence or at arrays of them.
+def force_coefficients(alpha: ArrayLike, beta: ArrayLike, p: Array) -> tuple[Array, ...]:
+    """Coefficients of equation (1) at K incidences (K,), or at one.
 
     Returns
     -------
-    tuple
+    tuple of nine (K,) arrays
         (cx0 + cx_alpha alpha, cx_dl, cx_dm, cx_dn, cy_beta beta, cy_dl, cy_dn, cz_alpha alpha, cz_dm), to be used
         with the signs of equation (1): -x, +y, -z.
     """
-    return (
-        p[0] + p[1] * alpha * alpha,
-        p[2],
-        p[3] * (1.0 + alpha),
-        p[4] * (1.0 + beta),
-        (p[5] + p[6] * np.abs(beta)) * beta,
-        p[7],
-        p[8],
-        (p[9] + p[10] * np.abs(alpha)) * alpha,
-        p[11],
-    )
+    alphas, betas = floats(alpha), floats(beta)
+    out = np.empty((*alphas.shape, 9))
+    _coefficients(p, alphas.size, alphas, betas, out)
+    return tuple(np.moveaxis(out, -1, 0))
 
 
-@njit(cache=True)
-def dynamic_pressure(z, vx, vy, vz, p):  # type: ignore[no-untyped-def]
-    """Q = rho V^2 / 2 at height -z [Pa]; numbers or arrays."""
-    return 0.5 * p[32] * np.exp(z / p[33]) * (vx * vx + vy * vy + vz * vz)
-
-
-@njit(cache=True)
-def specific_force(x, u, p):  # type: ignore[no-untyped-def]
-    """Non-gravitational acceleration in body axes at one state and input, (3,): what an IMU measures."""
-    alpha, beta = np.arctan2(x[5], x[3]), np.arctan2(x[4], x[3])
-    cx, cx_l, cx_m, cx_n, cy, cy_l, cy_n, cz, cz_m = force_coefficients(alpha, beta, p)
-    scale = dynamic_pressure(x[2], x[3], x[4], x[5], p) * p[28] / p[25]
-    thrust = (p[30] + (p[31] - p[30]) * u[3]) / p[25]
-    return np.array(
-        [
-            -scale * (cx + cx_l * u[0] + cx_m * u[1] + cx_n * u[2]) + thrust,
-            scale * (cy + cy_l * u[0] + cy_n * u[2]),
-            -scale * (cz + cz_m * u[1]),
-        ]
-    )
-
-
-@njit(cache=True)
-def rotation(angles):  # type: ignore[no-untyped-def]
-    """Matrix of equation (4), from body to inertial axes, for [phi, theta, psi]."""
-    sf, cf, st, ct, ss, cs = (
-        np.sin(angles[0]),
-        np.cos(angles[0]),
-        np.sin(angles[1]),
-        np.cos(angles[1]),
-        np.sin(angles[2]),
-        np.cos(angles[2]),
-    )
-    return np.array(
-        [
-            [cs * ct, -ss * cf + cs * st * sf, ss * sf + cs * st * cf],
-            [ss * ct, cs * cf + ss * st * sf, -cs * sf + ss * st * cf],
-            [-st, ct * sf, ct * cf],
-        ]
-    )
-
-
-@njit(cache=True)
-def derivative(x, u, p):  # type: ignore[no-untyped-def]
-    """Right-hand side of equations (1) to (4), (12,)."""
-    out = np.empty(12)
-    R = rotation(x[9:12])
-    a = specific_force(x, u, p)
-    vx, vy, vz, wp, wq, wr = x[3], x[4], x[5], x[6], x[7], x[8]
-    for i in range(3):
-        out[i] = R[i, 0] * vx + R[i, 1] * vy + R[i, 2] * vz
-    out[3] = a[0] + p[34] * R[2, 0] - (wq * vz - wr * vy)
-    out[4] = a[1] + p[34] * R[2, 1] - (wr * vx - wp * vz)
-    out[5] = a[2] + p[34] * R[2, 2] - (wp * vy - wq * vx)
-    alpha, beta = np.arctan2(vz, vx), np.arctan2(vy, vx)
-    damping = p[29] / np.sqrt(vx * vx + vy * vy + vz * vz)
-    torque = dynamic_pressure(x[2], vx, vy, vz, p) * p[28] * p[29]
-    L = p[12] * beta + p[13] * u[0] + p[14] * u[2] + p[15] * damping * wp
-    M = (p[16] + p[17] * abs(alpha)) * alpha + p[18] * u[1] + p[19] * damping * wq
-    N = (p[20] + p[21] * abs(beta)) * beta + p[22] * u[0] + p[23] * u[2] + p[24] * damping * wr
-    a_, b_ = p[26], p[27]
-    out[6] = torque * L / a_
-    out[7] = (torque * M - (a_ - b_) * wp * wr) / b_
-    out[8] = (torque * N - (b_ - a_) * wp * wq) / b_
-    sf, cf = np.sin(x[9]), np.cos(x[9])
-    turn = sf * wq + cf * wr
-    out[9] = wp + turn * np.tan(x[10])
-    out[10] = cf * wq - sf * wr
-    out[11] = turn / np.cos(x[10])
+def dynamic_pressure(z: ArrayLike, vx: ArrayLike, vy: ArrayLike, vz: ArrayLike, p: Array) -> Array:
+    """Q = rho V^2 / 2 at height -z [Pa], (K,); of (K,) arrays, or of numbers."""
+    heights, velocities = floats(z), floats(np.stack([vx, vy, vz], axis=-1))
+    out = np.empty(heights.shape)
+    _pressure(p, heights.size, heights, velocities, out)
     return out
 
 
-@njit(cache=True)
-def target_at(t):  # type: ignore[no-untyped-def]
-    """Position and velocity of the target, (3,) each."""
-    w1, w2 = 2 * np.pi / 9, 2 * np.pi / 11
-    position = np.array(
-        [40000.0 + 40.0 * t, 2000.0 + 200.0 * t + 100.0 * np.sin(w1 * t), -6000.0 - 60.0 * np.sin(w2 * t)]
-    )
-    velocity = np.array([40.0, 200.0 + 100.0 * w1 * np.cos(w1 * t), -60.0 * w2 * np.cos(w2 * t)])
-    return position, velocity
+def specific_force(x: ArrayLike, u: ArrayLike, p: Array) -> Array:
+    """Non-gravitational acceleration in body axes at one state and input, (3,): what an IMU measures."""
+    out = np.empty(3)
+    _specific_force(p, floats(x), floats(u), out)
+    return out
 
 
-@njit(cache=True)
-def _acceleration_command(t, y, R, g, gravity):  # type: ignore[no-untyped-def]
-    """Non-gravitational acceleration in body axes that proportional navigation asks for."""
-    position, velocity = target_at(t)
-    gap = position - y[6:9]
-    closing = velocity - R @ y[9:12]
-    squared = np.sum(gap * gap)
-    rate = np.cross(gap, closing) / squared
-    towards = gap / np.sqrt(squared)
-    speed = -np.sum(towards * closing)
-    wanted = g[0] * speed * np.cross(rate, towards)
-    wanted[2] -= gravity
-    return R.T @ wanted
+def rotation(angles: ArrayLike) -> Array:
+    """Matrix of equation (4), from body to inertial axes, for [phi, theta, psi]."""
+    out = np.empty((3, 3))
+    _rotation(floats(angles), out)
+    return out
 
 
-@njit(cache=True)
-def _trim_incidence(coefficient, limit, p):  # type: ignore[no-untyped-def]
-    """Incidence at which force coefficient and zero moment hold: k1 s + k2 s |s| = coefficient."""
-    k1 = p[9] - p[11] * p[16] / p[18]
-    k2 = p[10] - p[11] * p[17] / p[18]
-    size = (-k1 + np.sqrt(k1 * k1 + 4.0 * k2 * abs(coefficient))) / (2.0 * k2)
-    return np.sign(coefficient) * min(size, limit)
-
-
-@njit(cache=True)
-def _autopilot(t, y, memory, g, p, limits, Ts, out):  # type: ignore[no-untyped-def]
-    """Inputs from one measurement; memory = integrals of [a_y error, a_z error, speed error]."""
-    R = rotation(y[12:15])
-    wanted = _acceleration_command(t, y, R, g, p[34])
-    vx, vy, vz, wp, wq, wr = y[9], y[10], y[11], y[3], y[4], y[5]
-    speed = np.sqrt(vx * vx + vy * vy + vz * vz)
-    alpha, beta = np.arctan2(vz, vx), np.arctan2(vy, vx)
-    pressure = dynamic_pressure(y[8], vx, vy, vz, p)
-    per_force = p[25] / (pressure * p[28])
-    for i in range(2):
-        wanted[i + 1] = min(max(wanted[i + 1], -g[11]), g[11])
-        memory[i] += Ts * (wanted[i + 1] - y[i + 1])
-        memory[i] = min(max(memory[i], -g[11]), g[11])
-    asked_y, asked_z = wanted[1] + g[5] * memory[0], wanted[2] + g[5] * memory[1]
-    alpha_c = _trim_incidence(-asked_z * per_force, g[10], p)
-    beta_c = _trim_incidence(-asked_y * per_force, g[10], p)
-    q_c = g[1] * (alpha_c - alpha) - (y[2] + p[34] * R[2, 2]) / speed
-    r_c = -g[1] * (beta_c - beta) + (y[1] + p[34] * R[2, 1]) / speed
-    p_c = -g[3] * y[12]
-    p_dot, q_dot, r_dot = g[4] * (p_c - wp), g[2] * (q_c - wq), g[2] * (r_c - wr)
-    torque, damping = pressure * p[28] * p[29], p[29] / speed
-    a_, b_ = p[26], p[27]
-    L = a_ * p_dot / torque - p[12] * beta - p[15] * damping * wp
-    M = (b_ * q_dot + (a_ - b_) * wp * wr) / torque - (p[16] + p[17] * abs(alpha)) * alpha - p[19] * damping * wq
-    N = (b_ * r_dot + (b_ - a_) * wp * wq) / torque - (p[20] + p[21] * abs(beta)) * beta - p[24] * damping * wr
-    determinant = p[13] * p[23] - p[14] * p[22]
-    out[0] = (p[23] * L - p[14] * N) / determinant
-    out[1] = M / p[18]
-    out[2] = (p[13] * N - p[22] * L) / determinant
-    lag = g[9] - speed
-    out[3] = g[6] + g[7] * lag + g[8] * (memory[2] + Ts * lag)
-    if 0.0 < out[3] < 1.0:  # the integral waits while the thrust is at a limit
-        memory[2] += Ts * lag
-    for i in range(4):
-        out[i] = min(max(out[i], limits[0][i]), limits[1][i])
-
-
-@njit(cache=True)
-def _fly(out, error, scale, delay, faults, limits, g, p, believed, Ts):  # type: ignore[no-untyped-def]
-    x, acceleration, computed, achieved, y, target = out
-    gain, hold, offset, lower, upper, sensor_gain, sensor_offset = faults
-    memory, held = np.zeros(3), np.zeros(4)
-    for k in range(len(x)):
-        then = max(k - delay, 0)
-        y[k, :3] = acceleration[then]
-        y[k, 3:6] = x[then, 6:9]
-        y[k, 6:12] = x[then, :6]
-        y[k, 12:] = x[then, 9:]
-        y[k] = sensor_gain[then] * (scale * y[k] + error[k]) + sensor_offset[then]
-        _autopilot(k * Ts, y[k], memory, g, believed, limits, Ts, computed[k])
-        for i in range(4):
-            if hold[k, i] > 0.0 and (k == 0 or hold[k - 1, i] == 0.0):
-                held[i] = achieved[k - 1, i] if k > 0 else computed[0, i]
-            moved = gain[k, i] * computed[k, i] + hold[k, i] * held[i] + offset[k, i]
-            achieved[k, i] = min(max(moved, lower[k, i]), upper[k, i])
-        acceleration[k] = specific_force(x[k], achieved[k], p)
-        target[k] = target_at(k * Ts)[0]
-        if k + 1 < len(x):
-            k1 = derivative(x[k], achieved[k], p)
-            k2 = derivative(x[k] + 0.5 * Ts * k1, achieved[k], p)
-            k3 = derivative(x[k] + 0.5 * Ts * k2, achieved[k], p)
-            k4 = derivative(x[k] + Ts * k3, achieved[k], p)
-            x[k + 1] = x[k] + (Ts / 6.0) * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+def derivative(x: ArrayLike, u: ArrayLike, p: Array) -> Array:
+    """Right-hand side of equations (1) to (4), (12,)."""
+    out = np.empty(12)
+    _derivative(p, floats(x), floats(u), out)
+    return out

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from polytopes import HPolytope, kernel
-from polytopes.native import Array, Integer, floats, function
+from polytopes.native import Entries, Integer, floats, function
 
 
 def test_read_only_arrays_are_taken_and_strided_ones_are_not() -> None:
-    exponents = function("fdi_exponents", *[Integer] * 2, *[Array] * 5)
+    exponents = function("fdi_exponents", *[Integer] * 2, *[Entries] * 5)
     rows, r, s, block = np.array([[8.0, 1.0]]), np.empty(1, np.int64), np.empty(2, np.int64), np.empty(100)
     rows.flags.writeable = False
     exponents(1, 2, rows, np.ones(1), r, s, block)
