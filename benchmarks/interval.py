@@ -89,7 +89,7 @@ def _observed(log: Log, predictor: Any) -> float:
 
 
 def _best(work: Callable[[], object], turns: int) -> float:
-    work()  # compiles
+    work()
     times = []
     for _ in range(turns):
         begun = process_time()

@@ -1,6 +1,6 @@
 /* Rows seen from a point strictly inside: without duplicates, the origin there, each axis and each slack about one. */
 #include "polytopes/polytopes.h"
-#include "polytopes/powers.h"
+#include "powers.h"
 #include "vectors.h"
 
 static const double SPLIT = 134217729.0;  /* 2^27 + 1, halves a float (Dekker 1971) */

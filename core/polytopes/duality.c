@@ -7,7 +7,7 @@
  * The order of operations is part of the proof: built without reordering and without fused products.
  */
 #include "polytopes/polytopes.h"
-#include "polytopes/powers.h"
+#include "powers.h"
 #include "vectors.h"
 
 static const double SPLIT = 134217729.0; /* 2^27 + 1, halves a float (Dekker 1971) */

@@ -3,7 +3,7 @@
  * Rows stand as [A, b], one after the other, (rows, dim + 1); the table shrinks and grows in the caller's room.
  */
 #include "polytopes/polytopes.h"
-#include "polytopes/powers.h"
+#include "powers.h"
 #include "vectors.h"
 
 static const integer LONG = 1000; /* rows formed: such a step takes milliseconds, and Python hears of it at once */

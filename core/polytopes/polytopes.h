@@ -1,7 +1,5 @@
 /* Dense linear programs of few variables over {x : A x <= b}, and what is made of many of them.
  *
- * memory.h       the caller's block, laid out in pieces
- * powers.h       powers of two
  * basis.c        a basis: its edges, its vertex, its slacks
  * simplex.c      the primal simplex method in inequality form
  * duality.c      bounds of the optima that no rounding undercuts
@@ -20,7 +18,7 @@
 #define POLYTOPES_H
 
 #include "core.h"
-#include "polytopes/memory.h"
+#include "memory.h"
 
 enum { OPTIMAL, STOPPED, UNBOUNDED, AMBIGUOUS, LIMIT }; /* how a program ends */
 enum { FINISHED, TOO_MANY, OPEN, PAUSED, NO_ROOM };     /* how an elimination ends */

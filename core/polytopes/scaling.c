@@ -8,7 +8,7 @@
  * Exponents are whole numbers in doubles until the end: sums of them are exact, and loops over them vectorise.
  */
 #include "polytopes/polytopes.h"
-#include "polytopes/powers.h"
+#include "powers.h"
 #include "vectors.h"
 
 static const integer SWEEPS = 8;     /* of alternating means; a table without zeros needs one */

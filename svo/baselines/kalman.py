@@ -114,11 +114,9 @@ class InnovationFilter:
         x, P = self.model.mean.copy(), self.model.covariance.copy()
         states, white = np.empty((K, x.size)), np.empty(samples.y.shape)
         before = np.maximum(np.arange(K) - 1, 0)  # each measurement follows from the sample before
-        # D is copied, for one that is read-only would be compiled anew.
         bad = filter_samples(
             x, P, True, samples.A[before], samples.f[before], self.process_noise * samples.Q[before],
-            samples.C, samples.g, samples.R, samples.y, np.ascontiguousarray(E[before]), np.array(D, order="C"),
-            states, white,
+            samples.C, samples.g, samples.R, samples.y, E[before], D, states, white,
         )  # fmt: skip
         if bad >= 0:
             raise ValueError(_cannot_tell(bad))
@@ -162,9 +160,9 @@ class OnlineFilter:
         white, states = np.empty((1, len(now.g))), np.empty((1, self._x.size))
         measured = readings("y", y, (model.model.n_outputs,))[None]
         bad = filter_samples(
-            self._x, self._P, before is None, past.A[None].copy(), past.f[None],
+            self._x, self._P, before is None, past.A[None], past.f[None],
             self._filter.process_noise * past.Q[None],
-            now.C[None].copy(), now.g[None], now.R[None], measured, self._filter._E[None], self._filter._D[None],
+            now.C[None], now.g[None], now.R[None], measured, self._filter._E[None], self._filter._D[None],
             states, white,
         )  # fmt: skip
         if bad >= 0:

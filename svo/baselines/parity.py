@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from polytopes.signatures import options_by_name
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
@@ -14,6 +14,7 @@ from svo.checks import Array, expect, is_count, positive_number
 from svo.logs.log import Log
 
 _TRACE = 1e-12  # of a squared norm
+_BLOCK = 512  # windows at a time: some megabytes
 
 
 @dataclass(frozen=True)
@@ -101,46 +102,49 @@ class ParitySpace:
             state[j], output[j] = on_state, on_output
         squares, unexplained = np.full(K, np.nan), np.full((K, len(effects)), np.nan)
         A, f, Q, C, g, R, y = samples.arrays()
-        _parity(A, f, self.process_noise * Q, C, g, R, y, self.order, state, output, squares, unexplained)
+        parts = A, f, self.process_noise * Q, C, g, R, y
+        for first in range(0, K - self.order, _BLOCK):
+            starts = np.arange(first, min(first + _BLOCK, K - self.order))
+            ends = starts + self.order
+            squares[ends], unexplained[ends] = _windows(parts, self.order, state, output, starts)
         return ParityRecord(squares, unexplained, self.degrees)
 
 
-@njit(cache=True)
-def _parity(A, f, Q, C, g, R, y, order, state, output, squares, unexplained):  # type: ignore[no-untyped-def]
-    n, ny, faults = A.shape[1], C.shape[1], state.shape[0]
+def _last(array: Array) -> Array:
+    """Arrays (faults, windows, rows) of faults as (windows, rows, faults)."""
+    return np.moveaxis(array, 0, -1)
+
+
+def _windows(
+    parts: tuple[Array, ...], order: int, state: Array, output: Array, starts: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Squares (windows,) and unexplained (windows, faults) of the windows that begin at these samples."""
+    A, f, Q, C, g, R, y = parts
+    n, ny, faults, windows = A.shape[1], C.shape[1], len(state), len(starts)
     m = (order + 1) * ny
-    range_, Z, covariance = np.zeros((m, n)), np.zeros((m, 1 + faults)), np.zeros((m, m))
-    for k in range(order, len(y)):
-        Phi, mean, spread = np.eye(n), np.zeros((n, 1 + faults)), np.zeros((n, n))
-        for i in range(order + 1):
-            now = k - order + i
-            rows = slice(i * ny, (i + 1) * ny)
-            range_[rows] = C[now] @ Phi
-            Z[rows] = -C[now] @ mean
-            Z[rows, 0] += y[now] - g[now]
-            for j in range(faults):
-                Z[rows, 1 + j] -= output[j, now]
-            later = spread.copy()  # covariance of the states at samples j and now
-            covariance[rows, rows] = C[now] @ spread @ C[now].T + R[now]
-            for j in range(i + 1, order + 1):
-                later = A[k - order + j - 1] @ later
-                block = C[k - order + j] @ later @ C[now].T
-                covariance[j * ny : (j + 1) * ny, rows] = block
-                covariance[rows, j * ny : (j + 1) * ny] = block.T
-            Phi = A[now] @ Phi
-            mean = A[now] @ mean
-            mean[:, 0] += f[now]
-            for j in range(faults):
-                mean[:, 1 + j] += state[j, now]
-            spread = A[now] @ spread @ A[now].T + Q[now]
-        L = np.linalg.cholesky(covariance)
-        white = np.linalg.solve(L, Z)
-        basis = np.ascontiguousarray(np.linalg.qr(np.linalg.solve(L, range_))[0])
-        # Rows: the parity vector, and what each fault does to it.
-        left = np.ascontiguousarray((white - basis @ (np.ascontiguousarray(basis.T) @ white)).T)
-        squares[k] = left[0] @ left[0]
-        for j in range(faults):
-            size, along = left[1 + j] @ left[1 + j], left[1 + j] @ left[0]
-            # A fault within what any state explains leaves no trace: less than a millionth of what it does.
-            seen = size > _TRACE * np.sum(white[:, 1 + j] ** 2)
-            unexplained[k, j] = squares[k] - (along * along / size if seen else 0.0)
+    range_, Z, covariance = np.zeros((windows, m, n)), np.zeros((windows, m, 1 + faults)), np.zeros((windows, m, m))
+    Phi, mean, spread = np.eye(n), np.zeros((windows, n, 1 + faults)), np.zeros((windows, n, n))
+    for i in range(order + 1):
+        now, rows = starts + i, slice(i * ny, (i + 1) * ny)
+        range_[:, rows], Z[:, rows] = C[now] @ Phi, -C[now] @ mean
+        Z[:, rows, 0] += y[now] - g[now]
+        Z[:, rows, 1:] -= _last(output[:, now])
+        covariance[:, rows, rows] = C[now] @ spread @ C[now].mT + R[now]
+        across = spread @ C[now].mT  # covariance of the state at a later sample and this output
+        for j in range(i + 1, order + 1):
+            across = A[starts + j - 1] @ across
+            columns = slice(j * ny, (j + 1) * ny)
+            covariance[:, columns, rows] = C[starts + j] @ across
+            covariance[:, rows, columns] = covariance[:, columns, rows].mT
+        Phi, mean = A[now] @ Phi, A[now] @ mean
+        mean[:, :, 0] += f[now]
+        mean[:, :, 1:] += _last(state[:, now])
+        spread = A[now] @ spread @ A[now].mT + Q[now]
+    white = np.linalg.solve(np.linalg.cholesky(covariance), np.concatenate([Z, range_], axis=2))
+    basis, white = np.linalg.qr(white[:, :, 1 + faults :])[0], white[:, :, : 1 + faults]
+    left = white - basis @ (basis.mT @ white)  # columns: the parity vector, and what each fault does to it
+    squares, size = np.sum(left[:, :, 0] ** 2, axis=1), np.sum(left[:, :, 1:] ** 2, axis=1)
+    along = np.sum(left[:, :, 1:] * left[:, :, :1], axis=1)
+    # A fault within what any state explains leaves no trace: less than a millionth of what it does.
+    seen = size > _TRACE * np.sum(white[:, :, 1:] ** 2, axis=1)
+    return squares, squares[:, None] - np.divide(along * along, size, out=np.zeros_like(along), where=seen)

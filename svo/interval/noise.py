@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.native import Address, Entries, Integer, function, scratch
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, real_array
 from svo.interval.power_law import DEFAULT_EXPONENTS, PowerLaw, smallest_power_law
 from svo.interval.thresholds import checked_bounds, threshold_sequence
 
-_BLOCK = 4096  # samples whose partial sums are made at once: they stay in the cache, and short sums round little
+_extreme_sums = function("fdi_extreme_sums", *[Integer] * 2, *[Entries] * 3, Address)
+_extreme_sums_room = function("fdi_extreme_sums_room", Integer, returns=Integer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +142,7 @@ def moving_average_extremes(signals: Sequence[Array], qbar: int) -> Array:
     """
     best, low = np.zeros(qbar), np.zeros(qbar)
     for signal in signals:
-        _extreme_sums(signal, best, low, _BLOCK)
+        _extreme_sums(signal.size, qbar, signal, best, low, scratch(_extreme_sums_room(qbar)))
     q = np.arange(1, qbar + 1)
     mean = best / q
     mean += (_remainder(best, mean, q) + low) / q
@@ -171,40 +172,3 @@ def _signals(records: ArrayLike | Sequence[ArrayLike]) -> list[Array]:
     if not found:
         raise ValueError("records is empty; expected at least one record of fault-free operation")
     return found
-
-
-@njit(cache=True)
-def _extreme_sums(u, best, low, block):  # type: ignore[no-untyped-def]
-    """Raise best[q - 1] + low[q - 1] to the largest size of a sum of q consecutive samples, for each full window.
-
-    ``sums`` and ``rest`` hold the partial sums of a block and of the qbar samples before it, in two floats each and
-    backwards, so that the inner loop walks arrays side by side. Additions keep their rounding errors (Knuth's TwoSum).
-    """
-    qbar = best.size
-    sums, rest = np.empty(block + qbar), np.empty(block + qbar)
-    for start in range(0, u.size, block):
-        first, stop = max(0, start - qbar + 1), min(start + block, u.size)
-        m = stop - first
-        sums[m] = rest[m] = 0.0
-        for i in range(m):
-            a, b = sums[m - i], u[first + i]
-            total = a + b
-            part = total - a
-            sums[m - i - 1] = total
-            rest[m - i - 1] = rest[m - i] + ((a - (total - part)) + (b - part))
-        for j in range(start - first + 1, m + 1):
-            now, fine = sums[m - j], rest[m - j]
-            count = min(qbar, j)
-            before, finer = sums[m - j + 1 : m - j + 1 + count], rest[m - j + 1 : m - j + 1 + count]
-            for q in range(count):
-                b = -before[q]
-                total = now + b
-                part = total - now
-                error = ((now - (total - part)) + (b - part)) + (fine - finer[q])
-                size = abs(total)
-                error = error if total > 0.0 else -error
-                if total == 0.0:
-                    error = abs(error)
-                larger = size - best[q] + (error - low[q]) > 0.0
-                best[q] = size if larger else best[q]
-                low[q] = error if larger else low[q]

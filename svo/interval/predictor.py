@@ -165,7 +165,7 @@ class IntervalPredictor:
         center, radius, used = kernel.move(
             *self._interval, u, gains.gc, gains.gr, gains.hc, gains.hr, gains.slope, gains.limit
         )
-        if not abs(gains.gc) + used < 1.0:
+        if not abs(float(gains.gc)) + used < 1.0:
             raise ValueError(_unstable(self._sample, float(gains.gc), used))
         self._interval = Interval(center, radius)
         self._sample += 1

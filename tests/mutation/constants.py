@@ -52,7 +52,6 @@ CONSTANTS = (
     Constant("svo.observers.window.output_injection", "_UNIT", "outward", ROUNDED),
     Constant("svo.residual_tests.threshold", "_ROUNDING", "outward", "tests/svo/residual_tests"),
     Constant("svo.interval.thresholds", "_EPS", "outward", "tests/svo/interval/test_rounding.py"),
-    Constant("svo.interval.kernel", "SLACK", "outward", "tests/svo/interval/test_predictor.py"),
     Constant("polytopes.outer_supports", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.outward_normals", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.duality", "_EPS", "outward", ROUNDED),

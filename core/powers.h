@@ -1,6 +1,6 @@
 /* Powers of two: exponents of floats, and products with powers, exact but for underflow. */
-#ifndef POLYTOPES_POWERS_H
-#define POLYTOPES_POWERS_H
+#ifndef POWERS_H
+#define POWERS_H
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* Pieces of the caller's block, one after the other. Without a block it counts: a layout says its own size. */
-#ifndef POLYTOPES_MEMORY_H
-#define POLYTOPES_MEMORY_H
+#ifndef MEMORY_H
+#define MEMORY_H
 
 #include "core.h"
 
