@@ -11,8 +11,9 @@
 #define REFACTOR 60      /* pivots between factorisations */
 #define CLEAN_PIVOT 1e-11
 #define SAFE_PIVOT 1e-6
-#define LONG 250         /* pivots after which a program goes on with a cost that is disturbed by */
-#define LARGE_JITTER 1e7 /* times the jitter, 1e-4 of the largest cost */
+#define LONG 150         /* pivots after which a program goes on with a cost that is disturbed by */
+#define LARGE_JITTER 1e8 /* times the jitter, 1e-3 of the largest cost, and each time by */
+#define LESS_JITTER 10.0
 #define GAP 1e-9         /* between bound and optimum, as a share of the largest cost, not worth a factorisation */
 
 /* target = row of the inverse's rows combined: sum over b of factor_b inverse[b, :]. */
@@ -282,21 +283,28 @@ static void disturb_cost(const window *w, double factor)
     for (integer j = 0; j < w->Z; j++) w->cost[j] = w->true_cost[j] + scale * w->jitter[j];
 }
 
-/* `optimise`; what takes long goes on with a cost that is disturbed far more, and from there to the end.
+/* Whether the multipliers at hand and the last point, which is one of the window, leave nothing to gain. */
+static integer is_close(const window *w, integer q)
+{
+    copy(w->cost, w->true_cost, w->Z);
+    return outer_value(w, q) - dot(w->cost, w->z, w->Z) <= GAP * largest_magnitude(w->cost, w->Z);
+}
+
+/* `optimise`; what takes long goes on with a cost that is disturbed far more, then by less and less.
  *
  * In a long window the cost of most variables is next to nothing, so most steps are short: large disturbances save
- * three pivots of four. Any basis being dual feasible, the way back takes no phase of its own. */
+ * three pivots of four. Any basis being dual feasible, the way back takes no phase of its own; in one leap it took
+ * more pivots than all before it, or had no end. */
 static integer optimise_patiently(const window *w, integer q, integer limit)
 {
     const integer begun = w->clock[PIVOTS];
     disturb_cost(w, 1.0);
     integer outcome = optimise(w, q, least(limit, LONG));
     if (outcome != STOPPED || limit <= LONG) return outcome;
-    disturb_cost(w, LARGE_JITTER);
-    outcome = optimise(w, q, limit - LONG);
-    if (outcome == OPTIMAL || outcome == STOPPED) {
-        disturb_cost(w, 1.0);
+    for (double factor = LARGE_JITTER; factor >= 1.0; factor /= LESS_JITTER) {
+        disturb_cost(w, factor);
         outcome = optimise(w, q, most(limit - (w->clock[PIVOTS] - begun), 0));
+        if (outcome != OPTIMAL || is_close(w, q)) break;
     }
     return outcome;
 }

@@ -85,7 +85,7 @@ class Memory:
         What the kernel takes.
     """
 
-    def __init__(self, settings: WindowSettings, anchor_rows: int, steps: int, basis: int = _FIRST_BASIS) -> None:
+    def __init__(self, settings: WindowSettings, anchor_rows: int, steps: int, least_basis: int = 0) -> None:
         model, owner, template = settings.form.model, settings.owner, settings.template
         n, nq, injection = model.n_states, len(owner), settings.injection
         nw = model.n_disturbances + (0 if injection is None else n)
@@ -96,8 +96,8 @@ class Memory:
         self.largest_basis = min(rows, columns) + 2
         self.size = kernel.Sizes(
             n=n, nu=model.n_inputs, nw=nw, ny=model.n_outputs, nq=nq, nh=len(w_rows[0]), nt=n + len(template), na=na,
-            ni=1 + len(model.uncertainties), N=steps, block=settings.block, K=min(self.largest_basis, basis),
-            late=int(settings.output_is_disturbed),
+            ni=1 + len(model.uncertainties), N=steps, block=settings.block,
+            K=min(self.largest_basis, max(_FIRST_BASIS, least_basis)), late=int(settings.output_is_disturbed),
         )  # fmt: skip
         self.block = _room_for(self.size)
         self.given = {} if injection is None else injection.allocate(self.size)

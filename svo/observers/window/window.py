@@ -250,7 +250,7 @@ class Window:
     def resume(self, state: Mapping[str, NDArray], falsified: bool) -> None:
         """Take back the memory that `state` gave; ValueError unless it is one, and its falsification proven again."""
         basis = state["inverse"].shape[-1]
-        if self.memory.size.K < basis <= self.memory.largest_basis:
+        if basis > self.memory.size.K:
             self.memory.enlarge(basis)
         take_exactly(self.memory.kept, state)
         self.memory.check_clock()
@@ -265,7 +265,7 @@ class Window:
 
     def _grow(self) -> Memory:
         smaller = self.memory
-        larger = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N, smaller.size.K)
+        larger = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N, least_basis=smaller.size.K)
         larger.copy_from(smaller)
         self.memory = larger
         return larger
