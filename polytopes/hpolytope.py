@@ -131,6 +131,8 @@ class HPolytope(Rows):
     def support(self, directions: ArrayLike) -> float | Floats:
         """Support function ``h(c) = max {c'x : x in P}``; some microseconds a direction in a batch, 30 for a call.
 
+        Of a box a sum, without a program.
+
         Parameters
         ----------
         directions : array_like (n,) or (k, n)
@@ -153,9 +155,9 @@ class HPolytope(Rows):
         return support_functions.support_points(self, directions)
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Smallest box that contains the set: lower (n,) and upper (n,), infinite where unbounded; 2 n programs.
+        """Smallest box that contains the set: lower (n,) and upper (n,), infinite where unbounded.
 
-        Rounded outward, as `support` is: every point of the set is in it.
+        Rounded outward, as `support` is: every point of the set is in it.  2 n programs; of a box none.
 
         Raises
         ------
@@ -190,7 +192,7 @@ class HPolytope(Rows):
         return support_functions.chebyshev(self)
 
     def is_bounded(self) -> bool:
-        """Whether the set lies in some ball; the empty set does.  2 n programs."""
+        """Whether the set lies in some ball; the empty set does.  2 n programs, of a box none."""
         return support_functions.is_bounded(self)
 
     def affine_dim(self) -> int:

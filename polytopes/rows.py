@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.box import Box
 from polytopes.checks import Floats, real_array
 from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
@@ -67,8 +68,15 @@ class Rows(Value):
         return prepare(self.A, self.b, self.C, self.d)
 
     @cached_property
+    def as_box(self) -> Box | None:
+        """The rows as a box, if they are one that is not empty."""
+        return Box.of(self.A, self.b, self.C)
+
+    @cached_property
     def decided(self) -> Emptiness:
         """Emptiness of the rows, decided once."""
+        if self.as_box is not None:
+            return Emptiness("nonempty", self.as_box.point, None, "a point between the bounds of a box")
         return decide_emptiness(self, self.program)
 
     @cached_property

@@ -56,7 +56,7 @@ def known_nonempty(P: Rows) -> bool:
     UndecidedError
         If that could not be decided.
     """
-    if P.program.fat:
+    if P.as_box is not None or P.program.fat:
         return True
     if P.decided.status == "undecided":
         raise UndecidedError(f"cannot tell whether the set is empty: {P.decided.reason}")
@@ -82,9 +82,16 @@ def support(P: Rows, directions: ArrayLike) -> float | Floats:
     """``h_P(c)`` for one direction (n,) or a batch (k, n): a float or an array (k,)."""
     array = _directions(P, directions)
     batch = np.atleast_2d(array)
-    result = maxima(P, batch)
-    values = np.full(len(batch), -np.inf) if result is None else result.values
+    values = _of_box(P, batch)
+    if values is None:
+        result = maxima(P, batch)
+        values = np.full(len(batch), -np.inf) if result is None else result.values
     return float(values[0]) if array.ndim == 1 else values
+
+
+def _of_box(P: Rows, directions: Floats) -> Floats | None:
+    """Supports without a program, where P is a box."""
+    return None if P.as_box is None else P.as_box.supports(directions)
 
 
 def support_points(P: Rows, directions: ArrayLike) -> SupportResult:
@@ -95,12 +102,14 @@ def support_points(P: Rows, directions: ArrayLike) -> SupportResult:
     if result is None:
         nowhere = np.full((k, P.dim), np.nan)
         return SupportResult(np.full(k, -np.inf), nowhere, np.zeros((k, P.b.size)), np.zeros((k, q)))
-    finite = np.isfinite(result.values)
+    known = _of_box(P, batch)
+    values = result.values if known is None else known
+    finite = np.isfinite(values)
     points = np.where(finite[:, None], result.points, np.nan)
     multipliers = np.where(finite[:, None], result.multipliers, 0.0)
     fixed = np.zeros((k, q))
     fixed[finite] = equality_multipliers(P.C, P.d, batch[finite] - multipliers[finite] @ P.A)
-    return SupportResult(result.values, points, multipliers, fixed)
+    return SupportResult(values, points, multipliers, fixed)
 
 
 def bounding_box(P: Rows) -> tuple[Floats, Floats]:
@@ -111,6 +120,9 @@ def bounding_box(P: Rows) -> tuple[Floats, Floats]:
     EmptySetError
         If P is empty.
     """
+    if P.as_box is not None:
+        lower, upper = P.as_box.corners.copy()
+        return lower, upper
     axes = np.eye(P.dim)
     result = maxima(P, np.vstack([axes, -axes]))
     if result is None:
@@ -120,6 +132,8 @@ def bounding_box(P: Rows) -> tuple[Floats, Floats]:
 
 def is_bounded(P: Rows) -> bool:
     """Whether P lies in a ball (the empty set does): its support along the 2 n axes is finite."""
+    if P.as_box is not None:
+        return P.as_box.bounded
     axes = np.eye(P.dim)
     result = maxima(P, np.vstack([axes, -axes]))
     return result is None or bool(np.isfinite(result.values).all())

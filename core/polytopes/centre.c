@@ -1,9 +1,9 @@
 /* Rows seen from a point strictly inside: without duplicates, the origin there, each axis and each slack about one. */
 #include "polytopes/polytopes.h"
+#include "polytopes/sums.h"
 #include "powers.h"
 #include "vectors.h"
 
-static const double SPLIT = 134217729.0;  /* 2^27 + 1, halves a float (Dekker 1971) */
 static const double ROUNDED_SLACK = 1e-14; /* of a slack: rounding beyond is computed */
 
 /* b_i - a_i'x as if in twice the precision (Ogita, Rump and Oishi 2005). */
@@ -11,13 +11,10 @@ static double precise_slack(const Rows *rows, const double *x, integer i)
 {
     double total = rows->b[i], lost = 0.0;
     for (integer j = 0; j < rows->d; j++) {
-        const double u = -rows->at[j * rows->stride + i], v = x[j], product = u * v;
-        const double big_u = SPLIT * u, u1 = big_u - (big_u - u), u2 = u - u1;
-        const double big_v = SPLIT * v, v1 = big_v - (big_v - v), v2 = v - v1;
-        lost += u2 * v2 - (((product - u1 * v1) - u2 * v1) - u1 * v2);
-        const double moved = total + product, part = moved - total;
-        lost += (total - (moved - part)) + (product - part);
-        total = moved;
+        const Pair product = two_product(-rows->at[j * rows->stride + i], x[j]), moved = two_sum(total, product.value);
+        lost += product.rest;
+        lost += moved.rest;
+        total = moved.value;
     }
     return total + lost;
 }

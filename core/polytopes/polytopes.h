@@ -9,6 +9,7 @@
  * facets.c       redundancy of rows: one program a row
  * clarkson.c     the same over the facets that are known so far
  * elimination.c  Fourier-Motzkin elimination
+ * box.c          what needs no program
  *
  * Rows arrive scaled by powers of two, with Euclidean norms in [1/2, 2), and transposed, so that loops over rows are
  * contiguous. Sizes: d variables, m rows. An exported function works in a block of the caller's, of as many doubles as

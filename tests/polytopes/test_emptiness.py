@@ -148,8 +148,9 @@ def test_a_failed_solver_is_never_an_empty_set(monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr(kernel, "interior", failing)
     monkeypatch.setattr(HighsProgram, "maximise", silent)
-    assert HPolytope.box([1.0, 1.0], [2.0, 2.0]).emptiness().status == "nonempty"  # settled in rationals
-    large = HPolytope.box(np.ones(50), np.full(50, 2.0))
+    skew = HPolytope.box([1.0, 1.0], [2.0, 2.0]).intersection(HPolytope([[1.0, 1.0]], [3.0]))
+    assert skew.emptiness().status == "nonempty"  # settled in rationals
+    large = HPolytope.box(np.ones(50), np.full(50, 2.0)).intersection(HPolytope(np.ones((1, 50)), [99.0]))
     answer = large.emptiness()
     assert answer.status == "undecided"
     assert "rational arithmetic" in answer.reason
