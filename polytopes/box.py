@@ -9,10 +9,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from polytopes.checks import Floats
-from polytopes.native import Entries, Integer, function
+from polytopes.native import Entries, Given, Integer, function
 
-_box = function("fdi_box", *[Integer] * 2, *[Entries] * 3, returns=Integer)
-_supports = function("fdi_box_supports", *[Integer] * 2, *[Entries] * 3, returns=Integer)
+_box = function("fdi_box", *[Integer] * 2, *[Given] * 2, Entries, returns=Integer)
+_supports = function("fdi_box_supports", *[Integer] * 2, *[Given] * 2, Entries, returns=Integer)
 
 
 class Box(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes.native import Address, Entries, Integer, Real, floats, function, scratch
+from polytopes.native import Address, Entries, Given, Integer, Real, function, scratch
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -27,17 +27,17 @@ def _room(name: str, sizes: int) -> Any:
     return lru_cache(1024)(function(f"fdi_{name}_room", *[Integer] * sizes, returns=Integer))
 
 
-_interior = function("fdi_interior", *[Integer] * 2, *[Entries] * 4, Real, Entries, Address, returns=Integer)
+_interior = function("fdi_interior", *[Integer] * 2, *[Given] * 4, Real, Entries, Address, returns=Integer)
 _interior_room = _room("interior", 2)
-_supports = function("fdi_supports", *[Integer] * 3, *[Entries] * 6, Address)
+_supports = function("fdi_supports", *[Integer] * 3, *[Given] * 4, *[Entries] * 2, Address)
 _supports_room = _room("supports", 3)
-_irredundant = function("fdi_irredundant", *[Integer] * 2, *[Entries] * 5, Address, returns=Integer)
+_irredundant = function("fdi_irredundant", *[Integer] * 2, *[Given] * 3, *[Entries] * 2, Address, returns=Integer)
 _irredundant_room = _room("irredundant", 2)
 _eliminate = function("fdi_eliminate", *[Integer] * 3, *[Entries] * 10, returns=Integer)
 _eliminate_room = _room("eliminate", 2)
-_exponents = function("fdi_exponents", *[Integer] * 2, *[Entries] * 4, Address)
+_exponents = function("fdi_exponents", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, Address)
 _exponents_room = _room("exponents", 2)
-_scaled = function("fdi_scaled", *[Integer] * 2, *[Entries] * 4, Address, returns=Integer)
+_scaled = function("fdi_scaled", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, Address, returns=Integer)
 _scaled_room = _room("scaled", 2)
 
 
@@ -87,7 +87,7 @@ def supports(
         is `OPTIMAL`: then ``c'x <= bounds - spare + beside'|x|`` for all x of the set.
     """
     (d, m), k = AT.shape, len(directions)
-    directions, found, codes = floats(directions), np.empty((3 * d + 2, k)), np.empty((d + 1, k), np.int64)
+    found, codes = np.empty((3 * d + 2, k)), np.empty((d + 1, k), np.int64)
     _supports(
         d, m, k, AT, b, x0, directions, found, codes,
         scratch(_supports_room(d, m, k)),

@@ -470,7 +470,7 @@ def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
         row_units, units = kernel.exponents(np.vstack([A, C]), np.append(b, d))
     flat = affine_set(C, d, units=units)
     rows, rhs = flat.restrict(A, b)
-    AT, even, norms, row_powers, powers, kept, far, lost = kernel.scaled(rows.copy(), rhs.copy())
+    AT, even, norms, row_powers, powers, kept, far, lost = kernel.scaled(rows, rhs)
     _refuse_extremes(A, b, far, lost)
     violated = None
     if kept.size < b.size:

@@ -1,7 +1,7 @@
 """The compiled core: one shared library (`core/`, C99), called without Python's headers and with the GIL released.
 
-A function is declared once, with the kinds of its arguments. An array is given as it is (`Entries`: C-contiguous, of
-the type that the function expects), or by an address, and then whoever calls keeps it alive for the time of the call.
+A function is declared once, with the kinds of its arguments. An array, of the type that the function expects, is handed
+over as it is (`Given`: to read; `Entries`: to write), or by an address, and then whoever calls keeps it alive.
 """
 
 from __future__ import annotations
@@ -24,20 +24,24 @@ Integer = ctypes.c_int64
 Real = ctypes.c_double
 
 _bytes = (ctypes.c_char * 0).from_buffer  # a quarter of the time of the array's own interface
-_COPIED = 1000  # entries of a read-only array below which a copy takes less time than its address
+_COPIED = 500  # entries of an array below which a copy takes less time than its address
 
 
 class Entries:
-    """The kind of an argument that is an array; of a small one that is read-only the core gets a copy."""
+    """The kind of an argument that is a C-contiguous array which the core may write."""
+
+    from_param = _bytes
+
+
+class Given:
+    """The kind of an argument that is an array of any layout which the core only reads."""
 
     @staticmethod
     def from_param(array: NDArray) -> Any:
         flags = array.flags
-        if flags.writeable:
-            return _bytes(array)  # type: ignore[arg-type]  # arrays are buffers
         if array.size < _COPIED or not flags.c_contiguous:
             return array.tobytes()
-        return Address(address(array))
+        return _bytes(array) if flags.writeable else Address(address(array))  # type: ignore[arg-type]
 
 
 def _load() -> ctypes.CDLL:
@@ -54,7 +58,7 @@ _library = _load()
 
 
 def function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., Any]:
-    """A function of the core by its name, and its result; kinds are `Entries`, `Address`, `Integer` and `Real`."""
+    """A function of the core by its name, and its result; kinds: `Given`, `Entries`, `Address`, `Integer`, `Real`."""
     found = _library[name]  # one of its own: by attribute, all who ask share one and its kinds
     found.argtypes, found.restype = arguments, returns
     return found

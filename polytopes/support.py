@@ -81,7 +81,7 @@ def _directions(P: Rows, directions: ArrayLike) -> Floats:
 def support(P: Rows, directions: ArrayLike) -> float | Floats:
     """``h_P(c)`` for one direction (n,) or a batch (k, n): a float or an array (k,)."""
     array = _directions(P, directions)
-    batch = np.atleast_2d(array)
+    batch = array[None] if array.ndim == 1 else array
     values = _of_box(P, batch)
     if values is None:
         result = maxima(P, batch)

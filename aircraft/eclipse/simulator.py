@@ -35,12 +35,12 @@ from aircraft.eclipse.derivatives import (
     WING_AREA,
     Derivatives,
 )
-from polytopes.native import Entries, Integer, Real, floats, function
+from polytopes.native import Entries, Given, Integer, Real, floats, function
 
 Array = NDArray[np.float64]
 
-_derivative = function("fdi_eclipse_derivative", *[Entries] * 5)
-_fly = function("fdi_eclipse_fly", Integer, Real, *[Entries] * 12)
+_derivative = function("fdi_eclipse_derivative", *[Given] * 4, Entries)
+_fly = function("fdi_eclipse_fly", Integer, Real, *[Given] * 9, *[Entries] * 3)
 
 
 @dataclass(frozen=True)

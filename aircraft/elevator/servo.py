@@ -16,13 +16,13 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes.native import Entries, Integer, Real, floats, function
+from polytopes.native import Entries, Given, Integer, Real, floats, function
 from svo.faults import ActuatorLaw
 
 Array = NDArray[np.float64]
 
-_rate = function("fdi_servo_rate", Entries, Real, Real, Real, returns=Real)
-_run = function("fdi_servo_run", Entries, Integer, Real, *[Entries] * 4)
+_rate = function("fdi_servo_rate", Given, Real, Real, Real, returns=Real)
+_run = function("fdi_servo_run", Given, Integer, Real, *[Given] * 3, Entries)
 
 
 @dataclass(frozen=True)

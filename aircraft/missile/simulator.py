@@ -22,18 +22,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aircraft.missile.airframe import INPUT_LOWER, INPUT_UPPER, Airframe
-from polytopes.native import Entries, Integer, Real, address, floats, function
+from polytopes.native import Entries, Given, Integer, Real, address, floats, function
 
 Array = NDArray[np.float64]
 
 N_MEASUREMENTS = 15
 ACCELERATION, RATES, POSITION, VELOCITY, ANGLES = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
-_coefficients = function("fdi_missile_coefficients", Entries, Integer, *[Entries] * 3)
-_pressure = function("fdi_missile_pressure", Entries, Integer, *[Entries] * 3)
-_specific_force = function("fdi_missile_specific_force", *[Entries] * 4)
-_rotation = function("fdi_missile_rotation", *[Entries] * 2)
-_derivative = function("fdi_missile_derivative", *[Entries] * 4)
-_fly = function("fdi_missile_fly", *[Integer] * 2, Real, *[Entries] * 5)
+_coefficients = function("fdi_missile_coefficients", Given, Integer, *[Given] * 2, Entries)
+_pressure = function("fdi_missile_pressure", Given, Integer, *[Given] * 2, Entries)
+_specific_force = function("fdi_missile_specific_force", *[Given] * 3, Entries)
+_rotation = function("fdi_missile_rotation", Given, Entries)
+_derivative = function("fdi_missile_derivative", *[Given] * 3, Entries)
+_fly = function("fdi_missile_fly", *[Integer] * 2, Real, *[Given] * 5)
 START = np.array([0.0, 0.0, -4000.0, 600.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.05])
 
 

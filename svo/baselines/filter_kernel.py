@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from polytopes.native import Address, Entries, Integer, floats, function, scratch
+from polytopes.native import Address, Entries, Given, Integer, floats, function, scratch
 from svo.checks import Array
 
-_filter = function("fdi_filter", *[Integer] * 5, *[Entries] * 13, Address, returns=Integer)
+_filter = function("fdi_filter", *[Integer] * 5, *[Entries] * 2, *[Given] * 9, *[Entries] * 2, Address, returns=Integer)
 _filter_room = function("fdi_filter_room", *[Integer] * 3, returns=Integer)
-_models = function("fdi_models", *[Integer] * 5, *[Entries] * 13, Address, returns=Integer)
+_models = function("fdi_models", *[Integer] * 5, *[Entries] * 3, *[Given] * 8, *[Entries] * 2, Address, returns=Integer)
 _models_room = function("fdi_models_room", *[Integer] * 3, returns=Integer)
 
 

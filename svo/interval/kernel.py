@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
-from polytopes.native import Entries, Integer, Real, floats, function
+from polytopes.native import Entries, Given, Integer, Real, floats, function
 from svo.checks import Array
 
 
@@ -14,7 +14,7 @@ class _Moved(ctypes.Structure):
 
 
 _move = function("fdi_interval_move", *[Real] * 9, returns=_Moved)
-_propagate = function("fdi_interval_propagate", Integer, *[Entries] * 10, returns=Integer)
+_propagate = function("fdi_interval_propagate", Integer, *[Given] * 7, *[Entries] * 3, returns=Integer)
 
 
 def move(center: float, radius: float, u: float, *gains: Any) -> tuple[float, float, float]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polytopes.native import Address, Entries, Integer, function, scratch
+from polytopes.native import Address, Entries, Given, Integer, function, scratch
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, real_array
 from svo.interval.power_law import DEFAULT_EXPONENTS, PowerLaw, smallest_power_law
 from svo.interval.thresholds import checked_bounds, threshold_sequence
 
-_extreme_sums = function("fdi_extreme_sums", *[Integer] * 2, *[Entries] * 3, Address)
+_extreme_sums = function("fdi_extreme_sums", *[Integer] * 2, Given, *[Entries] * 2, Address)
 _extreme_sums_room = function("fdi_extreme_sums_room", Integer, returns=Integer)
 
 

@@ -1,20 +1,35 @@
 """The door to the compiled core: which arrays it takes, and the room that it is given."""
 
+import ctypes
+
 import numpy as np
 import pytest
 
 from polytopes import HPolytope, kernel
-from polytopes.native import Entries, Integer, floats, function
+from polytopes.native import Entries, Given, Integer, floats, function
 
 
-def test_read_only_arrays_are_taken_and_strided_ones_are_not() -> None:
-    exponents = function("fdi_exponents", *[Integer] * 2, *[Entries] * 5)
-    rows, r, s, block = np.array([[8.0, 1.0]]), np.empty(1, np.int64), np.empty(2, np.int64), np.empty(100)
-    rows.flags.writeable = False
-    exponents(1, 2, rows, np.ones(1), r, s, block)
-    assert (r[0] + s).tolist() == [-4, -1]
-    with pytest.raises(Exception, match="contiguous"):
-        exponents(1, 2, np.ones((1, 4))[:, ::2], np.ones(1), r, s, block)
+@pytest.mark.parametrize("columns", [2, 1000])
+@pytest.mark.parametrize("form", ["as it is", "read-only", "strided", "F"])
+def test_arrays_are_read_in_any_layout(columns: int, form: str) -> None:
+    scaled = function("fdi_exponents", *[Integer] * 2, *[Given] * 2, *[Entries] * 3)
+    rows = np.ones((2, columns))
+    rows[0], rows[:, 0] = 8.0, 4.0
+    given = {"strided": np.repeat(rows, 2, axis=1)[:, ::2], "F": np.asfortranarray(rows)}.get(form, rows)
+    given.flags.writeable = form != "read-only"
+    r, s, block = np.empty(2, np.int64), np.empty(columns, np.int64), np.empty(20 * columns + 100)
+    scaled(2, columns, given, np.ones(2), r, s, block)
+    expected = kernel.exponents(rows, np.ones(2))
+    np.testing.assert_array_equal(np.concatenate([r, s]), np.concatenate(expected))
+
+
+@pytest.mark.parametrize("form", ["read-only", "strided"])
+def test_what_is_written_must_be_writeable_and_contiguous(form: str) -> None:
+    exponents = function("fdi_exponents", *[Integer] * 2, *[Given] * 2, *[Entries] * 3)
+    s = np.empty(4, np.int64)[::2] if form == "strided" else np.empty(2, np.int64)
+    s.flags.writeable = form != "read-only"
+    with pytest.raises(ctypes.ArgumentError):
+        exponents(1, 2, np.ones((1, 2)), np.ones(1), np.empty(1, np.int64), s, np.empty(100))
 
 
 @pytest.mark.parametrize("form", ["F", "strided", "byte order", "integer", "misaligned"])

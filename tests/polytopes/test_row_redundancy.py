@@ -9,7 +9,7 @@ from random_programs import many
 
 from polytopes import HPolytope
 from polytopes.linear_program import Program
-from polytopes.native import Entries, Integer, function
+from polytopes.native import Entries, Given, Integer, function
 from polytopes.redundancy import irredundant
 
 
@@ -75,7 +75,7 @@ def test_a_far_row_does_not_loosen_the_others() -> None:
 
 def test_slacks_at_the_centre_have_twice_the_precision() -> None:
     """Built with reordering allowed, the sum that holds what was rounded off is optimised away."""
-    centred = function("fdi_centred", *[Integer] * 2, *[Entries] * 6, returns=Integer)
+    centred = function("fdi_centred", *[Integer] * 2, *[Given] * 3, *[Entries] * 3, returns=Integer)
     for seed in range(20):
         rng = np.random.default_rng(seed)
         A, x = rng.standard_normal((6, 3)), rng.standard_normal(3)
