@@ -53,10 +53,11 @@ def log_samples(form: NormalForm, log: Log, first: int, last: int, needs_next: b
     count = len(plain) if plain.all() else int(np.argmin(plain))
     if count == 0:
         return None
-    if not needs_next:
-        u_next = np.zeros_like(u_next)
     matrices = _matrices(form, log, first, first + count)
-    return None if matrices is None else LogSamples(*(np.ascontiguousarray(a) for a in (u, u_next, y, *matrices)))
+    if matrices is None:
+        return None
+    data = (u[:count], u_next[:count] if needs_next else np.zeros((count, u.shape[1])), y[:count])
+    return LogSamples(*(np.ascontiguousarray(array) for array in (*data, *matrices)))
 
 
 def _matrices(form: NormalForm, log: Log, first: int, last: int) -> tuple[Array, ...] | None:

@@ -47,6 +47,7 @@ def test_supports_of_the_newest_state_are_optimal(seed: int) -> None:
         w["query"][:] = direction
         stops = int(w["clock"][kernel.STOPS])
         observer._window.solve(kernel.QUERY)
+        w = observer._window.memory.arrays  # in another block, if a basis had to grow
         if w["clock"][kernel.STOPS] > stops:
             continue  # at the limit of pivots: an outer bound, not the optimum
         cost = direction @ w["psi"]
