@@ -31,7 +31,7 @@ typedef struct { /* arrays of K samples; whoever calls hands over their addresse
 
 double pressure_at(const Airframe *p, double z, const double *v);
 void target_at(double t, double *position, double *velocity);
-void fdi_missile_rotation(const double *angles, double *R);
+EXPORTED void fdi_missile_rotation(const double *angles, double *R);
 
 /* Inputs (4,) from one measurement (15,); memory = integrals of [a_y error, a_z error, speed error]. */
 void steer(const Airframe *p, const Guidance *g, const double *limits, double Ts, double t, const double *y,

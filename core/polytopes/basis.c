@@ -12,7 +12,7 @@ void lay_out_state(State *at, Memory *memory, integer d, integer m)
     at->alpha = doubles(memory, d), at->work = doubles(memory, 2 * d * d);
 }
 
-/* target += sign * sum over j of p[j] column j of A, four columns a pass. */
+/* target += sign * sum over j of p[j] column j of A, four columns a pass, and what is left in one more. */
 WIDE static void add_columns(double *restrict target, const Rows *rows, const double *restrict p, double sign)
 {
     const integer d = rows->d, m = rows->m, stride = rows->stride;
@@ -23,7 +23,18 @@ WIDE static void add_columns(double *restrict target, const Rows *rows, const do
         const double *restrict c = b + stride, *restrict e = c + stride;
         for (integer i = 0; i < m; i++) target[i] += (pa * a[i] + pb * b[i]) + (pc * c[i] + pd * e[i]);
     }
-    for (; j < d; j++) add_multiple(target, sign * p[j], rows->at + j * stride, m);
+    const double *restrict a = rows->at + j * stride;
+    if (d - j == 1) {
+        add_multiple(target, sign * p[j], a, m);
+    } else if (d - j == 2) {
+        const double *restrict b = a + stride;
+        const double pa = sign * p[j], pb = sign * p[j + 1];
+        for (integer i = 0; i < m; i++) target[i] += pa * a[i] + pb * b[i];
+    } else if (d - j == 3) {
+        const double *restrict b = a + stride, *restrict c = b + stride;
+        const double pa = sign * p[j], pb = sign * p[j + 1], pc = sign * p[j + 2];
+        for (integer i = 0; i < m; i++) target[i] += (pa * a[i] + pb * b[i]) + pc * c[i];
+    }
 }
 
 void combine(const Rows *rows, const double *p, double *rate)

@@ -47,6 +47,18 @@ integer clarkson_room(integer d, integer m)
     return memory.used;
 }
 
+WIDE static void scale_entries(double *restrict a, const double *restrict factor, integer m)
+{
+    for (integer i = 0; i < m; i++) a[i] *= factor[i];
+}
+
+WIDE static integer count_from(const double *restrict a, integer m, double least)
+{
+    integer count = 0;
+    for (integer i = 0; i < m; i++) count += a[i] >= least;
+    return count;
+}
+
 /* Row that the ray from the origin along p meets first (-1: none), and whether another is met about there.
  *
  * reach (m,) holds the reciprocals of the slacks; rate (m,) is overwritten.
@@ -55,17 +67,13 @@ static integer first_hit(const Rows *rows, const double *reach, const double *p,
 {
     const integer m = rows->m;
     combine(rows, p, rate);
-    integer row = -1, met = 0;
-    for (integer i = 0; i < m; i++) rate[i] *= reach[i];
+    scale_entries(rate, reach, m);
     const double steepest = largest_above(rate, m);
     *tie = 1;
     if (!(steepest > 0.0)) return -1;
-    const double near = steepest * (1.0 - TOGETHER);
-    for (integer i = m - 1; i >= 0; i--) {
-        met += rate[i] >= near;
-        row = rate[i] == steepest ? i : row;
-    }
-    *tie = met > 1;
+    *tie = count_from(rate, m, steepest * (1.0 - TOGETHER)) > 1;
+    integer row = 0;
+    while (rate[row] != steepest) row++;
     return row;
 }
 
