@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polytopes import HPolytope, UndecidedError, warm_up
+from polytopes import HPolytope, UndecidedError
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
 from svo.models import NormalForm, UncertainModel, may_be_nonzero, set_in
@@ -153,9 +153,6 @@ class PolytopeObserver(RecursiveObserver[Sample]):
 
     def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> Step:
         return self._checked(super()._step(u, y, u_next, schedule, end), y)
-
-    def _warm_up(self) -> None:
-        warm_up()
 
     def _options(self) -> dict[str, Any]:
         published = isinstance(self._recursion, PublishedRecursion)
