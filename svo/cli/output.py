@@ -111,6 +111,9 @@ def print_detection(found: Detection) -> None:
     undecided = int(found.record.undecided.sum())
     if undecided:
         say(f"    undecided answers: {undecided}")
+    stopped = int(found.record.stopped.sum())
+    if stopped:
+        say(f"    programs that ended at a limit, so that sets are wider: {stopped}")
 
 
 def print_isolability(answer: Isolability) -> None:

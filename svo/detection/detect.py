@@ -77,6 +77,7 @@ class Detection:
             "restarted": list(self.restarted),
             "falsified_s": {alarm.observer: alarm.time for alarm in self.alarms},
             "undecided": int(record.undecided.sum()),
+            "stopped": int(record.stopped.sum()),
             "changes": [
                 {"time_s": float(self.time[k]), "state": record.states[k], "alive": list(self._alive(k))}
                 for k in range(len(self.time))

@@ -35,4 +35,6 @@ class Front:
     def take(self, samples: int) -> Step:
         """Its answer at the last of its next samples; more than one only if they are plain."""
         self._left -= samples
-        return self._step if self._left == 0 else replace(self._step, sample=self._step.sample - self._left)
+        if self._left == 0:
+            return self._step
+        return replace(self._step, sample=self._step.sample - self._left, stopped=0)

@@ -41,6 +41,11 @@ class Verdict:
     isolated_at: int | None
     steps: Mapping[str, Step]
 
+    @property
+    def stopped(self) -> int:
+        """Programs of its steps that ended at a limit, as `Observer.stopped`."""
+        return sum(step.stopped for step in self.steps.values())
+
 
 @dataclass(frozen=True)
 class BankRecord:
@@ -58,6 +63,8 @@ class BankRecord:
         Wall time of each observer's step; NaN where it was not stepped.
     undecided : (K, n_observers) array of bool
         Answers that were neither a proof nor a point.
+    stopped : (K, n_observers) array of int
+        Programs that ended at a limit, as `Observer.stopped`; of samples taken at once, at the last.
     died_at : mapping of str to int or None
         First sample at which a model was declared falsified; "global" is there if its observer was.
     certificates : mapping of str to Certificate or None
@@ -75,6 +82,7 @@ class BankRecord:
     alive: NDArray[np.bool_]
     seconds: NDArray[np.float64]
     undecided: NDArray[np.bool_]
+    stopped: NDArray[np.int64]
     died_at: Mapping[str, int | None]
     certificates: Mapping[str, Certificate | None]
     detected_at: int | None
@@ -92,6 +100,7 @@ class Recorder:
         self._alive = np.zeros((samples, len(names)), dtype=bool)
         self._seconds = np.full((samples, len(names)), np.nan)
         self._undecided = np.zeros((samples, len(names)), dtype=bool)
+        self._stopped = np.zeros((samples, len(names)), dtype=np.int64)
         self._died_at: dict[str, int | None] = dict.fromkeys(names)
         self._certificates: dict[str, Certificate | None] = dict.fromkeys(names)
         self._detected_at: int | None = None
@@ -110,6 +119,7 @@ class Recorder:
             if step is not None:
                 self._seconds[rows, i] = step.seconds
                 self._undecided[rows, i] = step.verdict == "undecided"
+                self._stopped[k, i] = step.stopped
                 if self._died_at[name] is None and not self._alive[k, i]:
                     self._died_at[name], self._certificates[name] = k, step.certificate
         if GLOBAL in verdict.steps:
@@ -135,6 +145,7 @@ class Recorder:
             alive=self._alive,
             seconds=self._seconds,
             undecided=self._undecided,
+            stopped=self._stopped,
             died_at=self._died_at,
             certificates=self._certificates,
             detected_at=self._detected_at,

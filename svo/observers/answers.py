@@ -38,6 +38,8 @@ class Step(ABC):
         the falsification until the observer is reset.
     seconds : float
         Wall time of the call; the observer fills it in.
+    stopped : int
+        Programs of this answer that ended at a limit, as `Observer.stopped`; the observer fills it in.
     """
 
     verdict: VerdictName
@@ -45,6 +47,7 @@ class Step(ABC):
     reason: str | None = None
     sample: int = 0
     seconds: float = 0.0
+    stopped: int = 0
 
     @property
     @abstractmethod
@@ -117,10 +120,14 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified."""
+    """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified.
+
+    ``stopped`` counts the programs that ended at a limit, as `Observer.stopped`, those of boxes among them.
+    """
 
     verdicts: tuple[VerdictName, ...]
     lower: Array
     upper: Array
     seconds: Array
     certificate: Certificate | None
+    stopped: int = 0

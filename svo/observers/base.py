@@ -89,6 +89,14 @@ class Observer(ABC):
         """Whether `step` needs ``u_next``, and `update` its ``u``."""
         return self.model.uses_input_in_output
 
+    @property
+    def stopped(self) -> int:
+        """Programs since the start that ended at a limit: their bounds hold, yet could be narrower.
+
+        The limits are a deadline, pivots by the ten thousand, and what the machine has of memory.
+        """
+        return 0
+
     def reset(self, set: HPolytope) -> None:
         """Forget all data; the state at the next measurement lies in ``set``.
 
@@ -197,13 +205,14 @@ class Observer(ABC):
             As `update` and `step`; if the log is no `svo.Log`, has no samples, or the observer has started already.
         """
         expect_log(log)
-        boxes = np.empty((len(log), 2, self.model.n_states))
+        boxes, before = np.empty((len(log), 2, self.model.n_states)), self.stopped
         verdicts: list[VerdictName] = []
         seconds: list[float] = []
         for samples, step in self.follow(log, boxes):
             verdicts += [step.verdict] * samples
             seconds += [step.seconds] * samples
-        return Record(tuple(verdicts), boxes[:, 0], boxes[:, 1], np.array(seconds), step.certificate)
+        stopped = self.stopped - before
+        return Record(tuple(verdicts), boxes[:, 0], boxes[:, 1], np.array(seconds), step.certificate, stopped)
 
     def follow(self, log: Log, boxes: Array | None = None) -> Iterator[Seen]:
         """The samples of a log as they are seen: one after the other, or many consistent ones at once.
@@ -259,7 +268,8 @@ class Observer(ABC):
         outputs = self._late_outputs(y, sample)
         if self._alarm is not None:
             return replace(self._alarm, seconds=perf_counter() - begun)
-        return self._answered(self._late_update(outputs, int(sample)), begun)
+        stopped = self.stopped
+        return self._answered(self._late_update(outputs, int(sample)), begun, stopped)
 
     def check_late(self, y: ArrayLike, sample: int) -> None:
         """Raise what `late_update` of y (ny,), measured at ``sample``, would raise; nothing changes."""
@@ -383,6 +393,7 @@ class Observer(ABC):
 
     def _ask(self, begun: float, schedule: Any, hook: Callable[[], Step]) -> Step:
         """The answer of a hook at the next sample."""
+        stopped = self.stopped
         self._number += 1
         try:
             step = hook()
@@ -390,11 +401,12 @@ class Observer(ABC):
             self._number -= 1
             raise
         self._schedule = schedule
-        return self._answered(step, begun)
+        return self._answered(step, begun, stopped)
 
-    def _answered(self, step: Step, begun: float) -> Step:
+    def _answered(self, step: Step, begun: float, stopped: int) -> Step:
         # nobody has seen it yet, and a copy takes a twentieth of a fast observer's time
         object.__setattr__(step, "sample", self._number)
+        object.__setattr__(step, "stopped", self.stopped - stopped)
         object.__setattr__(step, "seconds", perf_counter() - begun)
         if step.verdict == "falsified":
             self._alarm = step

@@ -19,7 +19,6 @@ from svo.logs.drive import advance_to
 from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel
 from svo.models.state_range import within
-from svo.observers import window_kernel as kernel
 from svo.observers.answers import VerdictName
 from svo.observers.base import Observer, Seen, Step
 from svo.observers.data import relative_slack
@@ -124,8 +123,7 @@ class WindowObserver(Observer):
 
     @property
     def stopped(self) -> int:
-        """Programs so far that ended at the limit of pivots or of the basis: their bounds hold, yet could be less."""
-        return int(self._window.memory.arrays["clock"][kernel.STOPS])
+        return self._stopped + self._window.stopped
 
     @property
     def directions(self) -> Array:
@@ -168,7 +166,7 @@ class WindowObserver(Observer):
     def _begin(self, initial: ArrivalSet) -> None:
         """Nothing is known but a set of first states."""
         self._initial = initial
-        self._lost = False
+        self._lost, self._stopped = False, 0  # programs of windows before the present one
         self._readings: Readings | None = None  # of a set that is lost, or too wide
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)  # samples since each sensor was read
         self._window = Window(self._settings, initial, prover=self.prover)
@@ -218,7 +216,8 @@ class WindowObserver(Observer):
         window, lost = self._window, self._lost
         horizon = -1.0 if self.horizon is None else self.horizon
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
-        numbers = [window.origin, window.free, lost, self._number if lost else -1, largest, self._readings is not None]
+        lost_at, has_readings = self._number if lost else -1, self._readings is not None
+        numbers = [window.origin, window.free, lost, lost_at, largest, has_readings, self._stopped]
         state: dict[str, NDArray[Any]] = {
             "settings": np.array([horizon, window.memory.size.N, self.eps, self.sign_split]),
             "falsified": np.array(float(self._alarm is not None)),
@@ -238,7 +237,7 @@ class WindowObserver(Observer):
         self._configure(WindowSettings(form, steps, template, eps, int(cells)))
 
     def _resume(self, state: Mapping[str, NDArray[Any]]) -> WindowStep | None:
-        origin, free, lost, lost_at, largest, has_readings = (int(v) for v in state["restart"])
+        origin, free, lost, lost_at, largest, has_readings, self._stopped = (int(v) for v in state["restart"])
         self._initial, anchor = (self._read_arrival(state, name) for name in ("initial", "anchor"))
         falsified = bool(state["falsified"])
         self._window = Window(self._settings, anchor, int(state["settings"][1]), origin, bool(free))
@@ -288,7 +287,7 @@ class WindowObserver(Observer):
 
     def _seen_at_once(self, log: Log, first: int, samples: LogSamples, boxes: Array | None) -> Iterator[Seen]:
         """Those that are consistent, then the one that is not, if there is one."""
-        begun, last = perf_counter(), first + len(samples.y)
+        begun, last, stopped = perf_counter(), first + len(samples.y), self.stopped
         own = None if boxes is None else boxes[first:last]
         done, told = self._window.take_many(samples, own)
         if own is not None:
@@ -296,13 +295,15 @@ class WindowObserver(Observer):
         if done:
             self._number += done
             self._schedule = log.schedule_at(self._number)
-            step = self._answered(WindowStep(self, verdict="consistent"), begun)
+            step = self._answered(WindowStep(self, verdict="consistent"), begun, stopped)
             yield Seen(done, replace(step, seconds=step.seconds / done))
         at = first + done
         if at < last:
             sample = samples.one(done, log.y[at])
             ended = lambda: self._window.concluded(told, sample.given)  # noqa: E731
             step = self._ask(perf_counter(), log.schedule_at(at), lambda: self._said(self._outcome(sample, ended)))
+            if not done:
+                object.__setattr__(step, "stopped", self.stopped - stopped)
             yield self._seen_alone(step, at, boxes)
 
     @staticmethod
@@ -378,6 +379,7 @@ class WindowObserver(Observer):
     def _lose(self) -> None:
         """There is no set any more."""
         self.largest_at, self._lost, self._readings = None, True, self._new_readings()
+        self._stopped += self._window.stopped
         self._window = Window(self._settings, self._window.anchor, prover=self.prover)
 
     def _without_set(self, sample: Sample) -> VerdictName:
@@ -398,6 +400,7 @@ class WindowObserver(Observer):
 
     def _adopt(self, window: Window) -> None:
         """Go on with a window that has started again."""
+        self._stopped += self._window.stopped
         self._window, self.prover = window, window.prover
         self._lost, self._readings, self.largest_at = False, None, None
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)

@@ -104,6 +104,11 @@ class Window:
         """Number of the newest sample; -1 before the first."""
         return self.origin + self.memory.time if self.memory.started else -1
 
+    @property
+    def stopped(self) -> int:
+        """Programs that ended at a limit."""
+        return int(self.memory.arrays["clock"][kernel.STOPS])
+
     def take(self, sample: Sample, end: float | None = None) -> VerdictName:
         """The next sample, by the time ``end`` if there is one; the window is unchanged if it raises ValueError.
 
@@ -388,12 +393,13 @@ class Window:
 
     def _solve_one(self, task: int, program: int, end: float | None) -> int:
         """One program, its pivots in portions until it is decided or the time ``end`` is reached, if there is one."""
-        memory, done = self.memory, 0
+        memory, done, stopped = self.memory, 0, self.stopped
         while True:
             over = end is None or perf_counter() >= end or done >= kernel.PIVOT_LIMIT
             portion = kernel.PIVOT_LIMIT if end is None else 0 if over else _PIVOTS_BETWEEN_LOOKS
             verdict, _ = memory.solve(task, program, program + 1, portion)
             if over or verdict != kernel.UNDECIDED:
+                memory.arrays["clock"][kernel.STOPS] = min(self.stopped, stopped + (verdict == kernel.UNDECIDED))
                 return int(verdict)
             done += portion
 

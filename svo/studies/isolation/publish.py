@@ -36,6 +36,8 @@ _GLOSSARY = {
     "are no error; the data then do not tell them apart.",
     "undecided": "An answer that is neither a proof of falsification nor a point that explains the data (solver "
     "trouble). It is never an alarm.",
+    "ended at a limit": "A program of an observer that was stopped, by a deadline, its pivots or the machine's memory, "
+    "before it was solved. Its bound holds, but a set may be wider than it could be.",
 }
 
 

@@ -45,6 +45,8 @@ class RunRow:
         Median and 99th percentile over the observers that were alive and the samples.
     undecided : int or None
         Answers of observers that were neither a proof nor a point: solver trouble, never an alarm.
+    stopped : int or None
+        Programs of observers that ended at a limit, so that sets are wider.
     architecture : str or None
         Of the bank; None for a plant that has one kind of bank only.
     error : str or None
@@ -66,6 +68,7 @@ class RunRow:
     microseconds_per_step: float | None = None
     microseconds_p99: float | None = None
     undecided: int | None = None
+    stopped: int | None = None
     architecture: str | None = None
     error: str | None = None
 
@@ -126,6 +129,7 @@ def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
         microseconds_per_step=float(np.median(seconds) * 1e6),
         microseconds_p99=float(np.quantile(seconds, 0.99) * 1e6),
         undecided=int(record.undecided.sum()),
+        stopped=int(record.stopped.sum()),
         architecture=job.architecture,
     )
 

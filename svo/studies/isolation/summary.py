@@ -30,6 +30,8 @@ class ConditionSummary:
         Per observer and sample: medians over the runs of the runs' median and 99th percentile.
     undecided : int
         Answers of observers that were neither a proof nor a point, in all runs.
+    stopped : int
+        Programs of observers that ended at a limit, in all runs.
     architecture : str or None
         Of the bank; None for a plant that has one kind of bank only.
     """
@@ -46,6 +48,7 @@ class ConditionSummary:
     microseconds_median: float
     microseconds_p99: float
     undecided: int
+    stopped: int
     architecture: str | None = None
 
 
@@ -84,6 +87,7 @@ def _summarise(condition: tuple[str, str, str, str | None], rows: list[RunRow]) 
         microseconds_median=float(np.median([row.microseconds_per_step or 0.0 for row in rows])),
         microseconds_p99=float(np.median([row.microseconds_p99 or 0.0 for row in rows])),
         undecided=sum(row.undecided or 0 for row in rows),
+        stopped=sum(row.stopped or 0 for row in rows),
         architecture=architecture,
     )
 
@@ -98,7 +102,7 @@ def _flat(summary: ConditionSummary) -> dict[str, Any]:
     row |= _flat_share("false_alarm", summary.false_alarms) | _flat_share("wrong_isolation", summary.wrong_isolations)
     row["not_isolated_share"] = 1 - summary.isolate.reached.value
     row["survivors"] = "; ".join(f"{names}: {count}" for names, count in summary.survivors.items())
-    for name in ("microseconds_median", "microseconds_p99", "undecided", "architecture"):
+    for name in ("microseconds_median", "microseconds_p99", "undecided", "stopped", "architecture"):
         row[name] = getattr(summary, name)
     return row
 

@@ -70,10 +70,10 @@ def cost(summaries: Sequence[ConditionSummary]) -> str:
     """The line on computing time."""
     median = np.median([s.microseconds_median for s in summaries]) / 1e3
     p99 = np.median([s.microseconds_p99 for s in summaries]) / 1e3
-    undecided = sum(s.undecided for s in summaries)
+    undecided, stopped = sum(s.undecided for s in summaries), sum(s.stopped for s in summaries)
     return (
         f"computing time per observer and sample: median {median:.3f} ms, 99th percentile {p99:.3f} ms; "
-        f"undecided answers: {undecided}"
+        f"undecided answers: {undecided}; programs that ended at a limit: {stopped}"
     )
 
 

@@ -62,6 +62,17 @@ def test_a_long_window_of_a_dense_plant_solves_every_program_and_is_saved_with_i
     assert np.array_equal(again.step(None, log.y[-1]).box, observer.step(None, log.y[-1]).box)
 
 
+def test_a_deadline_stops_programs_and_each_counts_once() -> None:
+    model, log, start = dense_plant(4)
+    observer = WindowObserver(model, start, horizon=5)
+    stopped = [step.stopped for step in drive(observer, log, deadline=0.0)]
+    assert stopped[0] == 0  # the first measurement has no deadline
+    assert max(stopped) == 4  # of the 8 programs of an arrival set, which two samples share
+    assert observer.stopped == sum(stopped)
+    record = WindowObserver(model, start, horizon=5).run(log)
+    assert record.stopped == 0
+
+
 def test_where_the_machine_has_no_room_programs_stop_are_counted_and_their_bounds_hold(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

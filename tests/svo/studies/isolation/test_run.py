@@ -24,6 +24,7 @@ class Record:
         self.alive = np.arange(SAMPLES)[:, None] < falls
         self.seconds = np.where(self.alive, 1e-4, np.nan)
         self.undecided = np.zeros_like(self.alive)
+        self.stopped = np.zeros(self.alive.shape, dtype=np.int64)
         self.certificates = dict.fromkeys(NAMES)
         self.detected_at = died.get("nominal")
         left = [i for i in range(1, 3) if falls[i] == SAMPLES]
