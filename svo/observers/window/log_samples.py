@@ -47,7 +47,8 @@ def log_samples(form: NormalForm, log: Log, first: int, last: int, needs_next: b
     """
     if (log.u.shape[1], log.y.shape[1]) != (form.u.size, form.y.size):
         return None
-    before = np.vstack([np.zeros((1, log.u.shape[1])), log.u])[first:last]
+    start = log.u[first - 1 : first] if first else np.zeros((1, log.u.shape[1]))
+    before = np.vstack([start, log.u[first : last - 1]])[: last - first]
     u, u_next, y = before / form.u, log.u[first:last] / form.u, log.y[first:last] / form.y
     plain = np.all([(np.abs(array) < _ORDINARY).all(axis=1) for array in (u, u_next, y)], axis=0)
     count = len(plain) if plain.all() else int(np.argmin(plain))
