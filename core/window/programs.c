@@ -127,16 +127,34 @@ static integer solve_program(const window *w, integer task, integer basis, integ
     const objective at = cost_of(w, task, program / 2, program % 2 == 0 ? 1.0 : -1.0);
     const integer outcome = maximise(w, basis + program, limit, &value);
     const double rounding = 4.0 * UNIT * (fabs(at.constant) + fabs(value));
-    store_bound(w, task, program, at.constant + value + at.rounding + rounding);
+    if (outcome != OVERFULL) store_bound(w, task, program, at.constant + value + at.rounding + rounding);
     return outcome;
+}
+
+/* The programs of a task go on from one that has to have a larger basis: those before it are not solved again, so that
+ * the bits of an answer do not depend on when there was room. */
+static void wait_for_room(const window *w, integer task, integer program, answer found)
+{
+    w->clock[WAITING] = task + 1;
+    w->clock[PROGRAM] = program;
+    w->clock[HAS_POINT] = found.verdict == CONSISTENT;
+}
+
+static void resume(const window *w, integer task, integer *start, answer *found)
+{
+    if (w->clock[WAITING] == task + 1) {
+        *start = most(*start, w->clock[PROGRAM]);
+        if (w->clock[HAS_POINT]) found->verdict = CONSISTENT;
+    }
+    w->clock[WAITING] = 0;
 }
 
 /* The programs of a task, numbers `start` to `stop` - 1: two a direction, upper bound first.
  *
  * ARRIVAL decides emptiness and, before a slide, bounds the state at base + block; NEWEST bounds the newest state in
  * the template's directions, QUERY in the one that was asked for; CHANNELS tightens the bounds of s that leave its
- * sign open. A program that is found empty, or needs a larger basis, ends them; its bound is stored all the same, for
- * the proof may not hold and the room not be there. */
+ * sign open. A program that is found empty ends them; its bound is stored all the same, for the proof may not hold.
+ * One that needs a larger basis ends them too, and the same call goes on from it. */
 answer solve_programs(const window *w, integer task, integer start, integer stop, integer limit)
 {
     const integer v = variables(w, w->clock[TIME]) * w->nq, nt = w->nt, nq = w->nq;
@@ -144,6 +162,7 @@ answer solve_programs(const window *w, integer task, integer start, integer stop
     integer begin = 0, count = counts[task], is_open = 0;
     answer found = {UNDECIDED, -1};
     if (task == ARRIVAL) arrival_programs(w, &begin, &count);
+    resume(w, task, &start, &found);
     for (integer program = most(begin, start); program < least(stop, count); program++) {
         const integer i = program / 2, side = program % 2;
         if (task == CHANNELS) {
@@ -153,7 +172,10 @@ answer solve_programs(const window *w, integer task, integer start, integer stop
         }
         const integer outcome = solve_program(w, task, bases[task], program, limit);
         if (outcome == EMPTY) return (answer){EMPTY_CANDIDATE, program};
-        if (outcome == OVERFULL) return (answer){FULL, program};
+        if (outcome == OVERFULL) {
+            wait_for_room(w, task, program, found);
+            return (answer){FULL, program};
+        }
         if (outcome == OPTIMAL) found.verdict = CONSISTENT;
     }
     if (task == ARRIVAL && w->clock[TIME] - w->clock[BASE] == w->N && stop >= count) w->clock[PENDING] = 1;

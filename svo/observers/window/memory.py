@@ -163,7 +163,7 @@ class Memory:
         return found
 
     def solve(self, task: int, start: int, stop: int, limit: int) -> tuple[int, int]:
-        """`kernel.solve`, with as much room for bases as it needs: programs before the one that needs it go again."""
+        """`kernel.solve`, with as much room for bases as it needs: the same call goes on from the program that does."""
         while (found := kernel.solve(self.address, task, start, stop, limit))[0] == kernel.FULL:
             self.enlarge(2 * self.size.K)
         return found
