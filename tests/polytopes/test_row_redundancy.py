@@ -73,6 +73,13 @@ def test_a_far_row_does_not_loosen_the_others() -> None:
     assert cut.remove_redundancy().b.size == 5
 
 
+@pytest.mark.parametrize(("cut", "rows"), [(1e-10, 5), (5e-12, 5), (1e-13, 4), (0.0, 4)])
+def test_a_row_goes_if_the_set_grows_by_less_than_the_tolerance(cut: float, rows: int) -> None:
+    """1e-12 of the row's slack at the centre, which is 2 here."""
+    square = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
+    assert square.intersection(HPolytope([[1.0, 1.0]], [2.0 - 2.0 * cut])).remove_redundancy().b.size == rows
+
+
 def test_slacks_at_the_centre_have_twice_the_precision() -> None:
     """Built with reordering allowed, the sum that holds what was rounded off is optimised away."""
     centred = function("fdi_centred", *[Integer] * 2, *[Given] * 3, *[Entries] * 3, returns=Integer)

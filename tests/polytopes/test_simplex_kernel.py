@@ -1,5 +1,7 @@
 """The compiled kernel against HiGHS, and its multipliers against the equations they must satisfy."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from random_programs import KINDS, many
@@ -45,6 +47,39 @@ def test_points_are_feasible_and_multipliers_prove_the_value(kind: str) -> None:
         assert (weights * lengths >= -1e-9).all()
         np.testing.assert_allclose(weights @ A, directions[finite], atol=1e-8)
         np.testing.assert_allclose(weights @ b, result.values[finite], rtol=1e-9, atol=1e-9 * reach)
+
+
+def exact_vertex(AT: np.ndarray, b: np.ndarray, active: np.ndarray) -> list[Fraction]:
+    """Where the active rows hold with equality, by Gauss and Jordan in rationals; artificial ones hold at zero."""
+    d = len(AT)
+    rows = [[*map(Fraction, AT[:, i].tolist()), Fraction(b[i])] if i >= 0 else
+            [Fraction(int(j == -1 - i)) for j in range(d)] + [Fraction(0)] for i in active.tolist()]  # fmt: skip
+    for j in range(d):
+        pivot = next(row for row in rows[j:] if row[j])
+        rows.remove(pivot)
+        rows.insert(j, [v / pivot[j] for v in pivot])
+        rows = [row if k == j else [u - row[j] * v for u, v in zip(row, rows[j], strict=True)]
+                for k, row in enumerate(rows)]  # fmt: skip
+    return [row[d] for row in rows]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_bounds_are_not_undercut_by_an_exact_vertex(seed: int) -> None:
+    """c'x of the exact vertex against ``bounds - spare + beside'|x|``, which is within a few units of rounding."""
+    rng = np.random.default_rng(seed)
+    d, m = int(rng.integers(1, 6)), int(rng.integers(12, 40))
+    A = rng.standard_normal((m, d))
+    P = HPolytope(A, rng.uniform(0.5, 1.5, m))
+    AT, b = P.program.AT, P.program.rhs
+    C = rng.standard_normal((5, d))
+    _, active, _, bounds, spare, beside, status = kernel.supports(AT, b, P.program.centre, C)
+    for q in np.flatnonzero(status == kernel.OPTIMAL):
+        x = exact_vertex(AT, b, active[q])
+        value = sum(Fraction(c) * v for c, v in zip(C[q].tolist(), x, strict=True))
+        bound = Fraction(bounds[q]) - Fraction(spare[q])
+        bound += sum(Fraction(e) * abs(v) for e, v in zip(beside[q].tolist(), x, strict=True))
+        assert value <= bound
+        assert bound - value <= 2.0**-48 * (1.0 + abs(value))
 
 
 def test_batch_and_single_directions_agree() -> None:

@@ -130,6 +130,19 @@ def test_online_steps_give_the_batch_innovations(log, inputs, missing):
     np.testing.assert_allclose(batch.white, list(drive(online, log)), atol=1e-12)
 
 
+@pytest.mark.parametrize("inputs", [{}, {"state_input": [[1.0], [0.0], [0.5]]}])
+def test_a_sensor_that_is_always_missing_is_no_sensor(log, inputs):
+    without = scheduled().replace(C=C[[0, 2]], n=[0.2, 0.3], c=[0.5, 0.0])
+    log.y[:, 1] = np.nan
+    missing = InnovationFilter(GaussianModel(scheduled(), BOX), **inputs).run(log)
+    fewer = Log(log.time, log.u, log.y[:, [0, 2]], schedule=log.schedule)
+    right = InnovationFilter(GaussianModel(without, BOX), **inputs).run(fewer)
+    assert np.isfinite(missing.states).all()
+    np.testing.assert_allclose(missing.states, right.states, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(missing.white[:, [0, 2]], right.white, rtol=1e-9, atol=1e-12)
+    assert not missing.white[:, 1].any()
+
+
 def test_whitened_innovations_are_standard_gaussians():
     rng = np.random.default_rng(2)
     model, n = GaussianModel(plant(), BOX), 20_000

@@ -33,6 +33,13 @@ def test_extremes_over_several_blocks_and_records_are_those_of_plain_sums() -> N
         assert found[q - 1] == pytest.approx(expected, rel=1e-11)
 
 
+@pytest.mark.parametrize("end", [4000, *range(4094, 4100), 4145, 8193])
+def test_a_window_may_end_anywhere_about_the_end_of_a_block(end: int) -> None:
+    signal = np.zeros(9_000)
+    signal[end - 50 : end] = -1.0
+    np.testing.assert_array_equal(moving_average_extremes([signal], 50), np.ones(50))
+
+
 def test_only_full_windows_count_and_missing_samples_are_left_out() -> None:
     noise = NoiseCharacterization.from_records([[1.0, np.nan, -3.0, 1.0], [2.0, 2.0]], 3, safety_factor=1.5)
     assert noise.bounds == pytest.approx(1.5 * np.array([3.0, 2.0, 1.0 / 3.0]))
