@@ -1,6 +1,6 @@
 """Primal simplex in rational arithmetic: the judge of programs too close for floats.
 
-The same inequality-form method as the compiled kernel, without rounding and with Bland's rule after a degenerate step.
+The same inequality-form method as the core, without rounding and with Bland's rule after a degenerate step.
 It is slow (milliseconds), so it decides only what floats could not: flat sets, sets that touch in one point, sets
 thinner than rounding, coefficients that look like zero.
 """

@@ -1,4 +1,4 @@
-"""HiGHS, for programs that are large or sparse and for those on which a compiled kernel gives up; only here by name."""
+"""HiGHS, for programs that are large or sparse and for those on which the core gives up; only here by name."""
 
 from __future__ import annotations
 

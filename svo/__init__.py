@@ -67,7 +67,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    # Imported when asked for: the command line must not wait for compiled kernels to print its help.
+    # Imported when asked for: the command line must not wait for observers to print its help.
     if name not in _HOMES:
         raise AttributeError(f"module 'svo' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

@@ -70,7 +70,7 @@ class Surrogate:
         return AIR_DENSITY * WING_AREA * CHORD**2 * self.Cmad / (4 * PITCH_INERTIA)
 
     def packed(self) -> Array:
-        """Everything that the compiled functions need, in their order."""
+        """Everything that the core's functions need, in their order."""
         force, moment = AIR_DENSITY * WING_AREA / (2 * MASS), AIR_DENSITY * WING_AREA * CHORD / (2 * PITCH_INERTIA)
         thrust, thrust_moment = PUBLISHED["X_tau"][2], PUBLISHED["M_tau"][2]
         return np.array([*astuple(self), self.M_wdot, force, moment, CHORD / 2, GRAVITY, thrust, thrust_moment])

@@ -98,7 +98,7 @@ class Airframe:
             )
 
     def packed(self) -> Array:
-        """Everything that the compiled functions need, in the order of the fields."""
+        """Everything that the core's functions need, in the order of the fields."""
         return np.array([getattr(self, field.name) for field in fields(self)], dtype=float)
 
     def perturbed(self, relative: float, rng: np.random.Generator) -> Airframe:

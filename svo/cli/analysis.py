@@ -11,8 +11,6 @@ import typer
 from svo.cli.destinations import writable_csv, writable_folder
 from svo.cli.frame import (
     KEPT,
-    PREPARING,
-    announce,
     app,
     chosen_noise,
     one_line_errors,
@@ -62,7 +60,6 @@ def distinguish(
 
     the_plant = plant_to_simulate(plant)
     noise = chosen_noise(the_plant, noise)
-    announce(PREPARING)
     with progress("Pairs") as update:
         answer = isolability(the_plant, noise, horizon, seed, progress=update, size=size)
     if as_json:
@@ -105,7 +102,6 @@ def design_input(
 
     the_plant = plant_to_simulate(plant)
     noise = chosen_noise(the_plant, noise)
-    announce(PREPARING)
     found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
     if as_json:
         print_json(found.to_dict())
@@ -177,7 +173,6 @@ def compare(
     comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
     if healthy_runs is not None:
         comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
-    announce(PREPARING)
     with progress("Parts") as update:
         compared = run_comparison(
             comparison,

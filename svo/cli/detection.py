@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from svo.cli.destinations import writable_file, writable_folder
-from svo.cli.frame import PREPARING, announce, app, chosen_noise, measured_log, note, one_line_errors
+from svo.cli.frame import announce, app, chosen_noise, measured_log, note, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName, positive
 from svo.cli.output import print_detection, print_json, say
 
@@ -57,7 +57,6 @@ def detect(
     samples = measured_log(log, the_plant)
     # First, for it takes no time, and what it may refuse would cost the bank's answer.
     crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
-    announce(PREPARING)
     with progress("Samples") as update:
         found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
     beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
@@ -145,7 +144,6 @@ def watch(
             if state.exists():
                 resume_state(state, session, lines, identity)
             save = partial(save_state, state, session, lines, identity)
-        announce(PREPARING)
         session.warm_up()
         quiet = None if silence is None else Silence(silence)
         run_watch(lines, session, view_of(console(), session), keep=keep, save=save, silence=quiet)

@@ -38,7 +38,6 @@ app = typer.Typer(
 
 _SHOWN = 10  # failures
 KEPT = "interrupted; what is done is kept, and the same command with --resume goes on"
-PREPARING = "Preparing compiled code (about a minute the first time, then kept)"
 
 
 @contextmanager

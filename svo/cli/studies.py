@@ -10,7 +10,6 @@ import typer
 from svo.cli.destinations import writable_folder, writable_log
 from svo.cli.frame import (
     KEPT,
-    PREPARING,
     announce,
     app,
     chosen_noise,
@@ -135,7 +134,6 @@ def study(
         "scheduler": scheduler,
         "limit": own_processes(limit, scheduler, _LIMIT),
     }
-    announce(PREPARING)
     with progress("Runs") as update:
         folder = run(configuration, out, resume=resume, retry_failed=retry_failed, progress=update, **place)
     announce("Writing summary, pictures and report")

@@ -229,7 +229,7 @@ class Bank(ABC):
         self._adopt(self._state)
 
     def warm_up(self) -> float:
-        """Compile whatever the observers' steps need; returns the seconds that it took."""
+        """Load whatever the observers' steps can need; returns the seconds that it took."""
         return sum(observer.warm_up() for observer in self.observers.values())
 
     @options_by_name

@@ -236,7 +236,7 @@ class Observer(ABC):
             yield Seen(1, step)
 
     def warm_up(self) -> float:
-        """Load and compile whatever a step can need, without touching this observer; returns the seconds it took."""
+        """Load whatever a step can need, without touching this observer; returns the seconds it took."""
         begun = perf_counter()
         self._warm_up()
         return perf_counter() - begun
@@ -349,7 +349,7 @@ class Observer(ABC):
         """A transition and a measurement, by the time ``end`` of `time.perf_counter` if there is one."""
 
     def _warm_up(self) -> None:  # noqa: B027
-        """As `warm_up`; nothing, unless something is compiled or loaded late."""
+        """As `warm_up`; nothing, unless something is loaded late."""
 
     # -- hooks of what some can do -----------------------------------------------------------------------
 

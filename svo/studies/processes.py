@@ -29,7 +29,7 @@ def outcomes_in_processes(
 ) -> Iterator[tuple[Job, Outcome | Failed]]:
     """Each job with what ``work`` made of it, as they are done.
 
-    The first job is done alone: what it compiles is then at hand for all processes.
+    The first job is done alone: what it loads or finds wrong is then known before there are many processes.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def _serve(connection: Connection, work: Callable[[Job], Any]) -> None:
 
 def _end_with_parent() -> None:
     """A killed parent leaves nothing behind, whatever its workers are at."""
-    if sys.platform == "linux":  # compiled code may hold the interpreter, and no thread would see the end
+    if sys.platform == "linux":  # native code may hold the interpreter, and no thread would see the end
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     parent = multiprocessing.parent_process()
 

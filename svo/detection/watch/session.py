@@ -122,7 +122,7 @@ class Session:
         self._dead: dict[str, float] = {}
 
     def warm_up(self) -> float:
-        """Compile whatever a sample needs; returns the seconds that it took."""
+        """Load whatever a sample can need; returns the seconds that it took."""
         return self._bank.warm_up()
 
     def feed(self, item: Line | Notice | str) -> list[Alarm]:

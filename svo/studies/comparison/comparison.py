@@ -216,7 +216,7 @@ def judge(comparison: Comparison, part: Part, settings: Sequence[Setting | Faile
         log = attempt(plant.simulate, condition.fault, condition.profile, comparison.noise, seed)
         for detector, setting in zip(detectors, settings, strict=True):
             if place == 0:
-                _judge_one(detector, setting, log, condition, seed)  # untimed: no judged run pays for compilation
+                _judge_one(detector, setting, log, condition, seed)  # untimed: no judged run pays for late imports
             rows.append(_judge_one(detector, setting, log, condition, seed))
     return rows
 
