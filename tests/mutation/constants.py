@@ -1,4 +1,4 @@
-"""Every tolerance of the Python side: what it is, and what must happen when it is changed.
+"""Every tolerance of the Python side, and the core's window's: what it is, and what must happen when it is changed.
 
 An outward-rounding constant set to zero must fail a test of soundness with an adversarial input. A tolerance times 1000
 must fail a test of tightness; a heuristic one, which decides only how much work is done or how wide a set is, must
@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Literal
 
+from tests.mutation.plugin import defined
+
 Kind = Literal["outward", "tolerance", "heuristic"]
 CORE = "tests/soundness_core"
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A number in a module, and the test that must notice when it changes (none for a heuristic one)."""
+    """A number in a module or a file of the core, and the test that must notice its change (none for a heuristic one)."""
 
     module: str
     name: str
@@ -29,6 +31,9 @@ class Constant:
 
     @property
     def value(self) -> float:
+        if "/" in self.module:
+            value = defined(self.module, self.name)
+            return float.fromhex(value) if "0x" in value else float(value)
         return float(getattr(import_module(self.module), self.name))
 
     @property
@@ -40,6 +45,8 @@ class Constant:
 ROUNDED = f"{CORE}/test_rounding_outward.py"
 SETS = "tests/polytopes"
 POLYTOPE = "tests/svo/observers/polytope"
+WINDOW = "tests/svo/observers/window"
+LONG = f"{WINDOW}/test_long_windows.py"
 
 CONSTANTS = (
     Constant("svo.models.discretisation", "_ROUNDED_UP", "outward", "tests/svo/models/test_inside_a_sample.py"),
@@ -50,6 +57,23 @@ CONSTANTS = (
     Constant("svo.observers.polytope.vertex_images", "_OUTWARD", "outward", ROUNDED),
     Constant("svo.observers.polytope.output_rows", "_ROUNDING", "outward", f"{POLYTOPE}/test_rounding_of_rows.py"),
     Constant("svo.observers.window.output_injection", "_UNIT", "outward", ROUNDED),
+    Constant("core/window/dual_simplex.c", "UNIT", "outward", f"{WINDOW}/test_chain.py"),
+    Constant("core/window/programs.c", "UNIT", "outward", f"{WINDOW}/test_chain.py"),
+    Constant("core/window/channels.c", "UNIT", "outward", f"{WINDOW}/test_chain.py"),
+    Constant("core/window/rows.c", "UNIT", "outward", f"{WINDOW}/test_chain.py"),
+    Constant(
+        "core/window/motion.c",
+        "UNIT",
+        "outward",
+        f"{LONG}::test_the_rounding_of_the_state_is_within_its_bound_and_the_bound_is_small",
+    ),
+    Constant(
+        "core/window/rounding.c",
+        "ORTHOGONALITY",
+        "outward",
+        f"{LONG}::test_what_carries_an_error_bounds_the_exact_product_of_the_frames",
+    ),
+    Constant("core/window/factors.c", "UNIT", "outward", "tests/svo/observers/test_random_units.py"),
     Constant("svo.residual_tests.threshold", "_ROUNDING", "outward", "tests/svo/residual_tests"),
     Constant("svo.interval.thresholds", "_EPS", "outward", "tests/svo/interval/test_rounding.py"),
     Constant("polytopes.outer_supports", "_EPS", "outward", f"{SETS}/test_outward.py"),

@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.mutation.constants import CONSTANTS
 
 PAGE = Path(__file__).parents[2] / "docs/theory.md"
-ROW = re.compile(r"^\| `([\w.]+:\w+)` \| (\S+) \| (\w+) \|", re.MULTILINE)
+ROW = re.compile(r"^\| `([\w./]+:\w+)` \| (\S+) \| (\w+) \|", re.MULTILINE)
 
 
 def test_the_page_has_exactly_the_constants_and_their_values() -> None:

@@ -94,6 +94,18 @@ def test_the_rounding_of_the_state_is_within_its_bound_and_the_bound_is_small(
     assert w["err"][s].max() < 1e-9
 
 
+def test_what_carries_an_error_bounds_the_exact_product_of_the_frames() -> None:
+    rng = np.random.default_rng(6)
+    for n in (2, 3, 6):
+        frame = np.eye(n)
+        for _ in range(4):
+            A = rng.normal(size=(n, n))
+            turned, carry = kernel.turn_frame(A, frame)
+            product = exact(turned).inv() * exact(A) * exact(frame)
+            assert all(abs(product[i, j]) <= rational(carry[i, j]) for i in range(n) for j in range(n))
+            frame = turned
+
+
 @pytest.mark.parametrize("radius", [0.0, 0.9, 1.3])
 def test_errors_at_their_largest_are_within_the_bound_that_is_carried(radius: float) -> None:
     """e(k+1) = A(k) e(k) + delta(k) in rational arithmetic, delta at corners of its bound."""
