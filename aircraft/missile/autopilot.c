@@ -67,7 +67,8 @@ static void wanted_rates(const Airframe *p, const Guidance *g, double Ts, const 
 static void invert_moments(const Airframe *p, const double *y, double torque, const double *accelerations, double *u)
 {
     const double *v = y + 9, wp = y[3], wq = y[4], wr = y[5];
-    const double alpha = atan2(v[2], v[0]), beta = atan2(v[1], v[0]), damping = p->reference_length / sqrt(product(v, v));
+    const double alpha = atan2(v[2], v[0]), beta = atan2(v[1], v[0]);
+    const double damping = p->reference_length / sqrt(product(v, v));
     const double a = p->roll_inertia, b = p->pitch_inertia;
     const double L = a * accelerations[0] / torque - p->cl_beta * beta - p->cl_p * damping * wp;
     const double M = (b * accelerations[1] + (a - b) * wp * wr) / torque -

@@ -32,7 +32,7 @@ typedef struct { /* of one sample; A, f and Q lead to it */
 
 typedef struct {
     integer n, ny;
-    double *C, *R, *L;  /* (ny, n), (ny, ny) without missing sensors; Cholesky's factor of the innovation's covariance */
+    double *C, *R, *L;  /* (ny, n), (ny, ny) without missing sensors; Cholesky's factor of the innovation's variance */
     double *white;      /* (ny,) whitened innovation */
     double *gain;       /* (n, ny) of it */
     double *K, *rest, *product, *spread; /* (n, ny), (n, n) thrice */

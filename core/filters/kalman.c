@@ -113,7 +113,8 @@ EXPORTED integer fdi_filter(integer samples, integer n, integer ny, integer nd, 
     lay_out_filter(&filter, &memory, n, ny);
     lay_out_unknown(&unknown, &memory, n, ny, nd);
     for (integer k = 0; k < samples; k++) {
-        const Sample at = {A + k * n * n, f + k * n, Q + k * n * n, C + k * ny * n, g + k * ny, R + k * ny * ny, y + k * ny};
+        const Sample at = {A + k * n * n, f + k * n,      Q + k * n * n, C + k * ny * n,
+                           g + k * ny,    R + k * ny * ny, y + k * ny};
         const int start = first && k == 0;
         if (!start) predict(&filter, &at, x, P);
         if (!innovate(&filter, &at, x, P)) return NOT_POSITIVE;

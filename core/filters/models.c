@@ -6,7 +6,7 @@
 #include "filters/filters.h"
 #include "vectors.h"
 
-static const double IMPOSSIBLE = 1e300; /* half a squared innovation, in variances: so far off that only floats end there */
+static const double IMPOSSIBLE = 1e300; /* half a squared innovation, in variances: only floats end there */
 
 typedef struct {
     double *means, *covariances; /* (m, n), (m, n, n) after a possible switch */
@@ -86,8 +86,8 @@ static double log_likelihood(const Filter *filter)
 
 /* K samples; returns DONE or NOT_POSITIVE.
  *
- * xs (m, n), Ps (m, n, n) and log_mu (m,) as x and P of fdi_filter; the arrays of the models are (m, K, ...), y (K, ny).
- * Writes posterior (K, m) and log_odds (K,): ln of the odds of all models but the first.
+ * xs (m, n), Ps (m, n, n) and log_mu (m,) as x and P of fdi_filter; the arrays of the models are (m, K, ...), y is
+ * (K, ny). Writes posterior (K, m) and log_odds (K,): ln of the odds of all models but the first.
  */
 EXPORTED integer fdi_models(integer m, integer samples, integer n, integer ny, integer first, double *xs, double *Ps,
                             double *log_mu, const double *log_transition, const double *A, const double *f,
@@ -104,7 +104,8 @@ EXPORTED integer fdi_models(integer m, integer samples, integer n, integer ny, i
         if (!start) switch_models(&mixture, xs, Ps, log_mu, log_transition, m, n);
         for (integer j = 0; j < m; j++) {
             const integer q = j * samples + k;
-            const Sample at = {A + q * n * n, f + q * n, Q + q * n * n, C + q * ny * n, g + q * ny, R + q * ny * ny, y + k * ny};
+            const Sample at = {A + q * n * n, f + q * n,      Q + q * n * n, C + q * ny * n,
+                               g + q * ny,    R + q * ny * ny, y + k * ny};
             if (!start) predict(&filter, &at, xs + j * n, Ps + j * n * n);
             if (!innovate(&filter, &at, xs + j * n, Ps + j * n * n)) return NOT_POSITIVE;
             correct(&filter, xs + j * n, Ps + j * n * n);

@@ -1,7 +1,7 @@
 /* Largest size of the sums of q consecutive samples, for q = 1..qbar, in two floats each. */
 #include "core.h"
 
-static const integer BLOCK = 4096; /* samples whose partial sums are made at once: they stay in the cache, and round little */
+static const integer BLOCK = 4096; /* samples whose partial sums are made at once: in the cache, and rounding little */
 
 EXPORTED integer fdi_extreme_sums_room(integer qbar) { return 2 * (BLOCK + qbar); }
 

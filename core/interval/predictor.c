@@ -23,8 +23,8 @@ EXPORTED Moved fdi_interval_move(double center, double radius, double u, double 
 
 /* Fills center, radius (K,) from their first entries, and the radius of g used at each sample (K,).
  *
- * All arrays are (K,). Returns the first sample at which |gc| + gr < 1 fails, or -1. The last sample's transition is not
- * made.
+ * All arrays are (K,). Returns the first sample at which |gc| + gr < 1 fails, or -1. The last sample's transition is
+ * not made.
  */
 EXPORTED integer fdi_interval_propagate(integer samples, const double *u, const double *gc, const double *gr,
                                         const double *hc, const double *hr, const double *slope, const double *limit,

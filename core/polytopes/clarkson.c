@@ -6,7 +6,7 @@
 #include "vectors.h"
 
 static const double TOGETHER = 1e-9; /* of the distance along a ray: two rows met this near each other */
-static const integer CORNERS = 256;  /* vertices at which later programs may begin; a longer list costs more than it saves */
+static const integer CORNERS = 256;  /* vertices at which later programs may begin; more cost more than they save */
 static const integer FRESH = 4;      /* programs that may pass a basis on before its inverse is computed anew */
 
 enum { UNSETTLED, KEPT, REDUNDANT };

@@ -8,7 +8,7 @@
 
 static const integer LONG = 1000; /* rows formed: such a step takes milliseconds, and Python hears of it at once */
 /* A step that forms at most so many times the rows that the last pruning left needs no pruning first: programs after
- * several such steps are fewer, and have fewer variables (3 to 30 % less time on sparse rows, nothing on dense ones). */
+ * several such steps are fewer, and have fewer variables (3 to 30 % less time on sparse rows, none on dense ones). */
 static const double GROWTH = 1.5;
 /* A sum this small beside its two terms is zero: rounding errors of earlier steps would make it a row of noise. */
 static const double CANCELLED = 64.0 * EPS;

@@ -10,7 +10,7 @@
 
 static const double TOLERANCE = 1e-12; /* of a row's slack at the inner point: growth that counts as none */
 static const double CLEAR = 1e-9;  /* of the slack: beyond, no vertex need be found (Harris' tolerance is 1e-11) */
-static const double BELOW = 1e-10; /* violation, of the slack, that a point clearly outside a row may have of the others */
+static const double BELOW = 1e-10; /* violation, of the slack, that a point clearly outside a row may have of others */
 static const double FLAT_ROW = 1e-6; /* steepest entry of a row, of one elsewhere, below which a ray may be rounding */
 static const double RELAXED = 1.0;   /* a row's own right-hand side in its program, beyond its slack */
 static const double AWAY = 1e3;      /* right-hand side of a row that was dropped */

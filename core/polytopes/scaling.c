@@ -12,7 +12,7 @@
 #include "vectors.h"
 
 static const integer SWEEPS = 8;     /* of alternating means; a table without zeros needs one */
-static const integer FARTHEST = 498; /* exponent of the distance of a hyperplane whose square, and its sums, are floats */
+static const integer FARTHEST = 498; /* exponent of the distance of a hyperplane whose square and sums are floats */
 static const double STILL = 0.1;     /* change of an exponent from which another sweep is not worth it */
 static const double SMALLEST = 1e-300, LARGEST = 1e300; /* scaled numbers beyond are none */
 static const integer WIDEST = 1000;  /* exponent of a column's unit */
@@ -188,9 +188,9 @@ static integer rows_that_bound(integer m, integer d, const double **rows, const 
 /* The rows that are not zero in even units, transposed, with norms in [1/2, 1); returns how many they are, k.
  *
  * rows (m, d), rhs (m,). Leaves at (d, k), b and norms (k,) one after the other in `scaled`, which has room for
- * (d + 2) m doubles. In codes: exponents s (d,) and r (m,) of which k are used; numbers of the rows (m,), k of them; and
- * a row whose hyperplane is more than 1e150 from the origin, and one whose scaled numbers are no floats, -1 where there
- * is none.
+ * (d + 2) m doubles. In codes: exponents s (d,) and r (m,) of which k are used; numbers of the rows (m,), k of them;
+ * and a row whose hyperplane is more than 1e150 from the origin, and one whose scaled numbers are no floats, -1 where
+ * there is none.
  */
 EXPORTED integer fdi_scaled(integer m, integer d, const double *rows, const double *rhs, double *scaled,
                             integer *codes, double *block)

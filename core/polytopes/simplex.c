@@ -109,7 +109,8 @@ integer ascend(const Rows *rows, const double *c, State *at, double scale, doubl
             if (at->W[k] >= 0) at->rate[at->W[k]] = 0.0;
         const integer row = blocking_row(at, m, HARRIS * scale, bland);
         if (row < 0) {
-            return largest_above(at->rate, m) <= RAY && fabs(at->y[slot]) > CERTAIN * size * length ? UNBOUNDED : AMBIGUOUS;
+            const int certain = fabs(at->y[slot]) > CERTAIN * size * length;
+            return largest_above(at->rate, m) <= RAY && certain ? UNBOUNDED : AMBIGUOUS;
         }
         const double step = larger(at->s[row], 0.0) / at->rate[row];
         degenerate = step <= DEGENERATE * scale ? degenerate + 1 : 0;
