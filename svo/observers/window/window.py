@@ -32,6 +32,7 @@ from svo.observers.window.sign_split import SplitCertificate, SplitPrograms
 Taken = tuple[int, int, int]
 """What the kernel tells of a sample that it took: code, verdict, program that found the window empty."""
 
+_NO_END = 1 << 30  # samples
 _PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
 
 
@@ -172,7 +173,9 @@ class Window:
     def _room(self) -> int:
         """Samples until the memory of a window that keeps all of them must grow."""
         memory = self.memory
-        return memory.size.N - memory.time - 1 if self.settings.horizon is None and memory.started else memory.size.N
+        if self.settings.horizon is not None:
+            return _NO_END
+        return memory.size.N - memory.time - 1 if memory.started else memory.size.N
 
     def add_late(self, y: Array, sample: int) -> VerdictName:
         """A measurement of a sample that is still there."""
