@@ -10,12 +10,14 @@ import numpy as np
 from svo.models import normal_form
 from svo.observers import window_kernel as kernel
 
-HEADER = (Path(__file__).parents[4] / "core/window/window.h").read_text("utf-8")
+HEADER = re.sub(
+    r"/\*.*?\*/", "", (Path(__file__).parents[4] / "core/window/window.h").read_text("utf-8"), flags=re.DOTALL
+)
 SIZE = kernel.Sizes(n=3, nu=1, nw=2, ny=2, nq=1, nh=0, nt=4, na=1, ni=2, N=6, block=2, K=9, late=1)
 
 
 def test_the_constants_are_those_of_the_header() -> None:
-    names = [re.findall(r"\w+", body) for body in re.findall(r"^enum \{(.*?)\}", HEADER, re.MULTILINE)]
+    names = [re.findall(r"\w+", body) for body in re.findall(r"^enum \{(.*?)\}", HEADER, re.MULTILINE | re.DOTALL)]
     shared = {name: value for body in names for value, name in enumerate(body) if hasattr(kernel, name)}
     assert {"CONSISTENT", "ARRIVAL", "FINE", "OUTGROWN", "BASE", "REFACTORED"} <= set(shared)
     assert {name: getattr(kernel, name) for name in shared} == shared
