@@ -47,6 +47,8 @@ def stepped(observer: WindowObserver, log: Log) -> tuple[list[str], list[Any], A
 @pytest.mark.parametrize("seed", range(12))
 def test_a_run_says_what_steps_say(seed: int, horizon: int | None) -> None:
     model, log = random_case(seed)
+    if horizon is None:  # programs grow with the samples
+        log = replace(log, time=log.time[:25], u=log.u[:25], y=log.y[:25], x=None)
     record = WindowObserver(model, start(model), horizon=horizon).run(log)
     verdicts, boxes, certificate = stepped(WindowObserver(model, start(model), horizon=horizon), log)
     assert list(record.verdicts) == verdicts
