@@ -22,6 +22,7 @@ class Step:
 
 
 FOLDERS = {
+    "core": ("tests/core",),
     "polytopes": ("tests/polytopes",),
     "observers": ("tests/svo/observers", "tests/svo/isolation"),
     "plants": ("tests/aircraft", "tests/benchmarks"),
