@@ -33,24 +33,23 @@ def difference(kind: str, old: Answers, new: Answers) -> Difference:
             if not np.array_equal(before, after):
                 return Difference(f"{name}: {after} instead of {before}", np.inf)
         else:
-            worst = max(worst, _apart(before, after, old, name))
+            worst = max(worst, _apart(before, after, name))
     return Difference(f"bounds are {worst:.2g} of the width apart" if worst > LIMITS[kind] else None, worst)
 
 
-def _apart(before: NDArray, after: NDArray, answers: Answers, name: str) -> float:
+def _apart(before: NDArray, after: NDArray, name: str) -> float:
     """How much wider the new bounds are, as a share of the width."""
     if before.size == 0:
         return 0.0
     if not np.array_equal(np.isfinite(before), np.isfinite(after)):
         return np.inf
     known = np.isfinite(before)
+    before, after = np.where(known, before, 0.0), np.where(known, after, 0.0)
+    outward, scale = after - before, np.maximum(1.0, np.abs(before))
     if "box" in name or name == "shadow":
-        width = np.abs(np.subtract(before[..., 1, :], before[..., 0, :], where=known[..., 0, :] & known[..., 1, :],
-                                   out=np.ones(before[..., 0, :].shape)))  # fmt: skip
-        outward = np.stack([before[..., 0, :] - after[..., 0, :], after[..., 1, :] - before[..., 1, :]], axis=-2)
-        scale = np.stack([width, width], axis=-2)
-    else:
-        outward, scale = after - before, np.maximum(1.0, np.abs(before))
-    size = scale + 1e-3 * np.abs(np.where(known, before, 0.0))  # rounding is relative to size, not width
+        (lower, upper), bounded = np.moveaxis(before, -2, 0), known.all(axis=-2)
+        outward[..., 0, :] *= -1.0
+        scale = np.stack([np.where(bounded, upper - lower, 1.0)] * 2, axis=-2)
+    size = scale + 1e-3 * np.abs(before)  # rounding is relative to size, not width
     shares = np.divide(outward, size, where=known & (size > 0.0), out=np.zeros(before.shape))
     return float(max(shares.max(), 0.0))

@@ -30,29 +30,6 @@ def cart_observer() -> WindowObserver:
     return WindowObserver(cart(), initial=HPolytope.box([-1.0, -1.0], [1.0, 1.0]))
 
 
-# -- the native core -------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@later("A12", AssertionError, "programs stop at 128 rows of a basis, and a longer window is wider")
-def test_a_longer_window_is_not_wider() -> None:
-    rng = np.random.default_rng(0)
-    n = 50
-    A = rng.normal(size=(n, n))
-    A *= 1.0 / np.abs(np.linalg.eigvals(A)).max()
-    model = UncertainModel(A, None, rng.normal(size=(25, n)), E=np.eye(n), w=np.full(n, 0.1), n=np.full(25, 0.1))
-    start = HPolytope.box(-np.ones(n), np.ones(n))
-    log = model.simulate(np.zeros(n), np.zeros((25, 0)), rng)
-    width = {}
-    for horizon in (5, 10):
-        observer = WindowObserver(model, start, horizon=horizon)
-        observer.update(log.y[0])
-        for y in log.y[1:]:
-            box = observer.step([], y).box
-        width[horizon] = float((box[1] - box[0]).max())
-    assert width[10] <= width[5] * (1.0 + 1e-6)
-
-
 # -- the face --------------------------------------------------------------------------------------------------------
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,17 @@ def test_a_long_window_of_a_dense_plant_solves_every_program_and_is_saved_with_i
     with np.load(file, allow_pickle=False) as state:
         again = WindowObserver.from_state_dict(model, dict(state))
     assert np.array_equal(again.step(None, log.y[-1]).box, observer.step(None, log.y[-1]).box)
+
+
+@pytest.mark.slow
+def test_a_longer_window_of_twenty_states_is_not_wider() -> None:
+    """With at most 128 rows in a basis it was: 1982 programs stopped at n = 50, N = 10."""
+    model, log, start = dense_plant(20)
+    log = replace(log, time=log.time[:25], u=log.u[:25], y=log.y[:25], x=None)
+    short, long = (WindowObserver(model, start, horizon=horizon).run(log) for horizon in (5, 10))
+    assert short.stopped == long.stopped == 0
+    widths, wider = ((r.upper - r.lower)[-1] for r in (long, short))
+    assert (widths <= wider * (1.0 + 1e-6)).all()
 
 
 def test_a_deadline_stops_programs_and_each_counts_once() -> None:

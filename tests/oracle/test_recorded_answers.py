@@ -1,0 +1,33 @@
+"""The core against 500 answers of the Numba kernels that it replaced (``python -m tests.oracle record`` wrote them)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.oracle.cases import KINDS, Answers
+from tests.oracle.comparison import difference
+
+WIDER = {("program", 184): 1e-8}  # where a bound is further out than the limit, and by how much of the width at most
+
+
+def recorded() -> dict[tuple[str, int], Answers]:
+    found: dict[tuple[str, int], Answers] = {}
+    with np.load(Path(__file__).with_name("answers.npz"), allow_pickle=False) as arrays:
+        for path, value in arrays.items():
+            kind, seed, name = path.split("/")
+            found.setdefault((kind, int(seed)), {})[name] = value
+    return found
+
+
+ANSWERS = recorded()
+
+
+@pytest.mark.parametrize("kind", ["program", "chain", "polytope"])
+def test_every_answer_is_the_same_or_narrower(kind: str) -> None:
+    keys = [key for key in ANSWERS if key[0] == kind]
+    assert len(keys) >= 100
+    found = {key: difference(kind, ANSWERS[key], KINDS[kind](key[1])) for key in keys}
+    assert {key: d for key, d in found.items() if d.what is not None and d.apart > WIDER.get(key, 0.0)} == {}
