@@ -113,7 +113,7 @@ def test_without_a_compiler_the_package_index_gives_one(no_compiler: dict[str, s
     with zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as wheel:
         library = Path(wheel.extract(f"polytopes/{LIBRARY}", tmp_path))
     assert not fused_instructions(library)
-    assert ctypes.CDLL(str(library)).fdi_window_bytes
+    assert ctypes.CDLL(str(library)).fdi_window_layout
 
 
 def test_an_edited_file_of_the_core_is_built_by_the_next_make(tmp_path: Path) -> None:
