@@ -72,7 +72,7 @@ def _command_line() -> str:
 
 def _to_copies(app: Any, page: str, source: list[str]) -> None:
     """Links that lead out of this folder on GitHub lead to the copies here."""
-    if not page.startswith("_copied/"):
+    if "/" not in page:  # those of a folder link to pages of the site
         source[0] = re.sub(r"\]\(\.\./(?:notebooks/)?([\w-]+\.(?:md|ipynb))", r"](_copied/\1", source[0])
 
 
