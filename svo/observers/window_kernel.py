@@ -24,7 +24,7 @@ ALL = 1 << 60  # programs: more than any task has
 CONSISTENT, EMPTY_CANDIDATE, UNDECIDED, FULL = range(4)
 ARRIVAL, NEWEST, CHANNELS, QUERY = range(4)
 FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE, OUTGROWN = range(7)
-BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED, CAPPED = range(9)
+BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED, CAPPED, STAGE, NEXT = range(11)
 
 _BREAKPOINT = [("ratio", np.float64), ("size", np.float64), ("drop", np.float64), ("who", np.int64)]
 _KINDS = [np.dtype(np.float64), np.dtype(np.int64), np.dtype(_BREAKPOINT)]

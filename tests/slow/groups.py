@@ -38,6 +38,7 @@ COMMANDS = {
         ("benchmarks.soundness", "--observer", "polytope", "--samples", "10000"),
     ),
     "mutation": (("tests.mutation",),),
+    "core": (("tests.core.fuzz", "--cases", "5000"),),
     "fuzz": (("tests.fuzz", "--cases", "3000"),),
 }
 

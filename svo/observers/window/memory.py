@@ -18,6 +18,7 @@ from svo.observers.window.setup import channel_owners, disturbance_rows, jitter,
 _GROWING_START = 16
 _FIRST_BASIS = 32  # rows that a basis has room for at first; most stay far below
 _MOST_BYTES = 8 * 2**30
+_MOST_COUNTED = 2**53  # samples, pivots: a state that claims more was not reached, and counts must not overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +186,11 @@ class Memory:
         """Raise ValueError unless the clock is one, and whatever else the kernel takes for an index is one too."""
         clock, base, time, steps = self.arrays["clock"], self.base, self.time, self.size.N
         flags = clock[[kernel.STARTED, kernel.PENDING]]
-        if not (0 <= base <= time <= base + steps and np.isin(flags, (0, 1)).all() and (clock >= 0).all()):
+        counts = (clock >= 0) & (clock < _MOST_COUNTED)
+        if not (0 <= base <= time <= base + steps and np.isin(flags, (0, 1)).all() and counts.all()):
             raise ValueError(f"its window holds samples {base} to {time}; expected at most {steps} steps from 0 on")
+        if clock[[kernel.STAGE, kernel.NEXT]].any():
+            raise ValueError("its newest sample is half taken; expected a state between two samples")
         ends = {"k": self.size.K - 1, "rows": len(self.arrays["G"]), "cols": len(self.arrays["GT"]), "status": 4}
         for name, end in (ends | {"owner": self.size.ni}).items():
             if ((self.arrays[name] < 0) | (self.arrays[name] >= end)).any():

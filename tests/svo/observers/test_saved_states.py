@@ -156,6 +156,9 @@ EDITS = {
     "time back": edited("clock", with_entry(1, -5)),
     "base ahead": edited("clock", with_entry(0, 50)),
     "flag": edited("clock", with_entry(3, 7)),
+    "more pivots than can be": edited("clock", with_entry(4, 2**60)),
+    "half a sample": edited("clock", with_entry(9, 2)),
+    "programs of half a sample": edited("clock", with_entry(10, 1)),
     "exponents": edited("exponents.states", lambda v: v.astype(float)),
     "missing": lambda state: {name: value for name, value in state.items() if name != "G"},
 }
