@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import _thread
+import threading
 from dataclasses import replace
 from typing import Any
 
@@ -115,3 +117,16 @@ def test_what_a_step_refuses_a_run_refuses() -> None:
     observer.update([0.0])
     with pytest.raises(ValueError, match="update was called after the first sample"):
         observer.run(log)
+
+
+def test_an_interruption_ends_a_run_in_its_middle() -> None:
+    """Calls of the core are brief, so Ctrl-C is heard between them."""
+    model = UncertainModel([[0.9]], [[1.0]], [[1.0]], n=[0.1])
+    samples = 1_000_000
+    log = Log(time=np.arange(float(samples)), u=np.zeros((samples, 1)), y=np.zeros((samples, 1)))
+    observer = WindowObserver(model, start(model))
+    timer = threading.Timer(0.5, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        observer.run(log)
+    assert 0 < observer._number < samples - 1
