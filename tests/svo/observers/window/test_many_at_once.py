@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import signal
 import threading
 from dataclasses import replace
 from typing import Any
@@ -125,8 +126,9 @@ def test_an_interruption_ends_a_run_in_its_middle() -> None:
     samples = 1_000_000
     log = Log(time=np.arange(float(samples)), u=np.zeros((samples, 1)), y=np.zeros((samples, 1)))
     observer = WindowObserver(model, start(model))
-    timer = threading.Timer(0.5, _thread.interrupt_main)
-    timer.start()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
+    threading.Timer(0.5, _thread.interrupt_main).start()
     with pytest.raises(KeyboardInterrupt):
         observer.run(log)
+    signal.signal(signal.SIGINT, before)
     assert 0 < observer._number < samples - 1
