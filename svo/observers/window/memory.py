@@ -182,6 +182,11 @@ class Memory:
         self._name_arrays()
         _copy_leading(smaller.arrays, self.block.arrays)
 
+    def check_whole(self) -> None:
+        """Raise RuntimeError if an interruption has left the newest sample half taken, which another would mix with."""
+        if self.arrays["clock"][kernel.STAGE]:
+            raise RuntimeError("its last sample was interrupted; call reset(set), or go on from a saved state")
+
     def check_clock(self) -> None:
         """Raise ValueError unless the clock is one, and whatever else the kernel takes for an index is one too."""
         clock, base, time, steps = self.arrays["clock"], self.base, self.time, self.size.N

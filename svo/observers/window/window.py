@@ -121,6 +121,7 @@ class Window:
             If the newest state has no bounds of use.
         """
         memory, self.reason = self.memory, None
+        memory.check_whole()
         if self._room == 0:
             memory = self._grow()
         if self._takes_whole and end is None:
@@ -140,6 +141,7 @@ class Window:
             Filled with the boxes of the states at the samples that are consistent.
         """
         memory, eps, self.reason = self.memory, self.settings.eps, None
+        memory.check_whole()
         done, told = kernel.follow(memory.address, samples, eps, kernel.PIVOT_LIMIT, boxes)
         return done, memory.take(eps) if told[1] == kernel.FULL else told
 

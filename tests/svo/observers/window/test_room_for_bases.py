@@ -102,3 +102,21 @@ def test_where_the_machine_has_no_room_programs_stop_are_counted_and_their_bound
         assert (lower <= low + 1e-9).all()
         assert (upper >= high - 1e-9).all()
     assert stopped.stopped > 0 == whole.stopped
+
+
+def test_a_sample_that_was_interrupted_half_way_mixes_with_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, log, start = dense_plant(8)
+    observer = WindowObserver(model, start, horizon=30)
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(memory.Memory, "enlarge", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        list(drive(observer, log))
+    monkeypatch.undo()
+    k = observer._number + 1
+    with pytest.raises(RuntimeError, match="last sample was interrupted"):
+        observer.step(None, log.y[k])
+    observer.reset(start)
+    assert observer.update(log.y[0]).verdict == "consistent"
