@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 ROOT = Path(__file__).parents[1]
-TAG = "last-with-numba"
+LAST = "f04f1e67cc998b3760f8d320fc8f4ca2c435a897"  # the commit with the tag last-with-numba
 
 
 class Worker:
@@ -54,7 +54,8 @@ def installed(folder: Path) -> tuple[Path, Path]:
     """Interpreter and sources of the tagged commit; made where they are missing."""
     sources, python = folder / "sources", folder / "venv" / "bin" / "python"
     if not sources.exists():
-        subprocess.run(["git", "clone", "--quiet", "--branch", TAG, ROOT, sources], check=True)
+        subprocess.run(["git", "clone", "--quiet", "--no-checkout", ROOT, sources], check=True)
+        subprocess.run(["git", "-C", sources, "checkout", "--quiet", LAST], check=True)
     if not python.exists():
         venv.create(folder / "venv", with_pip=True)
         subprocess.run([python, "-m", "pip", "install", "--quiet", "--editable", sources], check=True)
