@@ -21,6 +21,13 @@ _MOST_BYTES = 8 * 2**30
 _MOST_COUNTED = 2**53  # samples, pivots: a state that claims more was not reached, and counts must not overflow
 
 
+FIXED = ("T", "owner", "delta", "w_rows", "w_rows_lower", "w_rows_upper")
+"""Arrays of a window that follow from its settings."""
+
+_MAY_MISS = ("y", "given.y")  # readings
+_MAY_BE_OPEN = ("lower", "upper", "noise", "slack")  # how names of bounds end
+
+
 @dataclass(frozen=True, eq=False)
 class WindowSettings:
     """What every window of an observer has in common.
@@ -196,13 +203,17 @@ class Memory:
             raise ValueError(f"its window holds samples {base} to {time}; expected at most {steps} steps from 0 on")
         if clock[[kernel.STAGE, kernel.NEXT]].any():
             raise ValueError("its newest sample is half taken; expected a state between two samples")
+        seen = self.arrays["seen_base"]
+        if ((seen < -1) | (seen > base)).any():
+            raise ValueError(f"seen_base has an entry below -1 or above {base}, the oldest sample")
         ends = {"k": self.size.K - 1, "rows": len(self.arrays["G"]), "cols": len(self.arrays["GT"]), "status": 4}
         for name, end in (ends | {"owner": self.size.ni}).items():
             if ((self.arrays[name] < 0) | (self.arrays[name] >= end)).any():
                 raise ValueError(f"{name} has an entry below 0 or above {end - 1}")
-        for name in ("stack", "u", "noise", "slack", "w_lower", "w_upper", "h_lower", "h_upper"):
-            if np.isnan(self.arrays[name]).any():
-                raise ValueError(f"{name} contains NaN")
+        for name, array in self.kept.items():
+            missing, open_ended = name in _MAY_MISS, name.endswith(_MAY_BE_OPEN)
+            if not (np.isfinite(array) | (np.isnan(array) & missing) | (np.isinf(array) & open_ended)).all():
+                raise ValueError(f"{name} contains NaN or Inf")
 
 
 def _copy_leading(smaller: dict[str, NDArray[Any]], larger: dict[str, NDArray[Any]]) -> None:

@@ -25,7 +25,7 @@ from svo.observers.window.certificate import WindowCertificate, certificate_of
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.fallback import candidates, is_feasible
 from svo.observers.window.log_samples import LogSamples
-from svo.observers.window.memory import Memory, WindowSettings
+from svo.observers.window.memory import FIXED, Memory, WindowSettings
 from svo.observers.window.sample import Outgrown, Sample, check_entry
 from svo.observers.window.sign_split import SplitCertificate, SplitPrograms
 
@@ -262,8 +262,12 @@ class Window:
         basis = state["inverse"].shape[-1]
         if basis > self.memory.size.K:
             self.memory.enlarge(basis)
+        fixed = {name: self.memory.arrays[name].copy() for name in FIXED}
         take_exactly(self.memory.kept, state)
         self.memory.check_clock()
+        for name, array in fixed.items():
+            if not np.array_equal(array, self.memory.arrays[name]):
+                raise ValueError(f"{name} is not that of its model and options")
         if falsified:
             if self.settings.sign_split:
                 self.solve(kernel.ARRIVAL)

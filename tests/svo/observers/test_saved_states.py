@@ -237,6 +237,38 @@ def test_a_basis_that_points_outside_of_the_window_is_refused(name: str, value: 
         WindowObserver.from_state_dict(model(), resealed(state))
 
 
+@pytest.mark.parametrize("value", [-7, 10**6, -(2**62)])
+def test_a_basis_of_another_time_is_refused(value: int) -> None:
+    state = driven(WindowObserver(model(), START)).state_dict()
+    state["seen_base"].flat[0] = value
+    with pytest.raises(ValueError, match="seen_base has an entry"):
+        WindowObserver.from_state_dict(model(), resealed(state))
+
+
+def test_no_array_of_a_window_may_hold_what_is_no_number() -> None:
+    """A window with NaN in a row, or a template of infinities, said "falsified", or had boxes of NaN."""
+    observer = driven(WindowObserver(model(), START))
+    kept = observer._window.memory.kept
+    arrays = {name: array for name, array in kept.items() if array.dtype == float and array.size}
+    for name in arrays.keys() - {"y"}:
+        for value in (np.nan, np.inf):
+            if value == np.inf and name.endswith(("lower", "upper", "noise", "slack")):
+                continue
+            state = observer.state_dict()
+            state[name].flat[0] = value
+            with pytest.raises(ValueError, match=rf"{name} (contains NaN or Inf|is not that of its model)"):
+                WindowObserver.from_state_dict(model(), resealed(state))
+
+
+@pytest.mark.parametrize("name", ["T", "delta"])
+def test_what_follows_from_model_and_options_is_not_taken_from_a_state(name: str) -> None:
+    """A template with a row of zeros falsified a healthy plant."""
+    state = driven(WindowObserver(model(), START)).state_dict()
+    state[name].flat[0] = 0.25
+    with pytest.raises(ValueError, match=f"{name} is not that of its model and options"):
+        WindowObserver.from_state_dict(model(), resealed(state))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_state_without_its_newest_set_is_refused(kind: Any) -> None:
     state = driven(kind(model(), START)).state_dict()
