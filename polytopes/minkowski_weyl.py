@@ -6,11 +6,15 @@ generators of both.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from flint import fmpz_mat
+from numpy.typing import NDArray
 
 from polytopes.double_description import MAX_RAYS, Integers, cone_generators, primitive
+
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +45,20 @@ class ExactGenerators:
     def affine_dim(self) -> int:
         """Dimension of the affine hull, -1 for the empty set."""
         return homogeneous_rank(self) - 1
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """The vertices (k, n), each coordinate to the nearest float; NaN where that is not within half an ulp."""
+        points = [[_nearest(v, row[-1]) for v in row[:-1]] for row in self.vertices.tolist()]
+        return np.array(points, dtype=np.float64).reshape(len(points), self.dim)
+
+
+def _nearest(numerator: int, denominator: int) -> float:
+    try:
+        quotient = numerator / denominator
+    except OverflowError:
+        return np.nan
+    return quotient if abs(quotient) >= _TINY or not numerator else np.nan
 
 
 def generators_of(rows: ExactRows, max_rays: int = MAX_RAYS) -> ExactGenerators:

@@ -22,6 +22,7 @@ _TILTS = (0, 50, 46, 42, 38, 34, 30)  # exponents of the tilts that are tried, 0
 _LEAST_BITS = 20  # of a normal across lines; below, the lines are missed by rounding instead
 _FAR = 2.0**10  # times the size of the vertices: how far along missed lines a row still holds
 _EPS = float(np.finfo(np.float64).eps)
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 def support_of(generators: ExactGenerators, normal: Floats) -> Fraction | float:
@@ -29,8 +30,21 @@ def support_of(generators: ExactGenerators, normal: Floats) -> Fraction | float:
     whole, exponent = whole_numbers(normal)
     if (products(generators.rays, whole) > 0).any() or products(generators.lines, whole).any():
         return np.inf
-    values, sizes = products(generators.vertices[:, :-1], whole), generators.vertices[:, -1]
-    return max(map(Fraction, values.tolist(), sizes.tolist())) / (1 << exponent)
+    farthest = generators.vertices[_may_be_farthest(generators.points, normal)]
+    best, size = 0, 0
+    for value, t in zip(products(farthest[:, :-1], whole).tolist(), farthest[:, -1].tolist(), strict=True):
+        if not size or value * size > best * t:
+            best, size = value, t
+    return Fraction(best, size << exponent)
+
+
+def _may_be_farthest(points: Floats, normal: Floats) -> NDArray[np.bool_]:
+    """Which points (k, n), rounded to nearest, rounding allows to be the farthest along a normal (n,)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = points @ normal
+        room = (normal.size + 4) * _EPS * (np.abs(points) @ np.abs(normal)) + _TINY
+        best = np.fmax.reduce(values - room, initial=-np.inf)
+        return ~(values + room < best)  # also what is not a number
 
 
 def products(rows: Integers, whole: NDArray[np.object_]) -> NDArray[np.object_]:
