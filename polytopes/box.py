@@ -10,6 +10,7 @@ import numpy as np
 
 from polytopes.checks import Floats
 from polytopes.native import Entries, Given, Integer, function
+from polytopes.rounding import check_rounding
 
 _box = function("fdi_box", *[Integer] * 2, *[Given] * 2, Entries, returns=Integer)
 _supports = function("fdi_box_supports", *[Integer] * 2, *[Given] * 2, Entries, returns=Integer)
@@ -32,6 +33,7 @@ class Box(NamedTuple):
     @classmethod
     def of(cls, A: Floats, b: Floats, C: Floats) -> Self | None:
         """The box of rows ``A x <= b``, ``C x = d``; None if they are none, or empty, or far from the origin."""
+        check_rounding()
         m, n = A.shape
         if len(C) or np.count_nonzero(A) > m:
             return None
@@ -44,6 +46,7 @@ class Box(NamedTuple):
 
     def supports(self, directions: Floats) -> Floats | None:
         """Upper bounds (k,) of the supports along directions (k, n); None if the numbers are of too different sizes."""
+        check_rounding()
         k, n = directions.shape
         values = np.empty(k)
         return values if _supports(n, k, self.corners, directions, values) else None

@@ -22,6 +22,7 @@ from polytopes.duality import Bounds, multiplier_bounds, proved_reach
 from polytopes.exact import rounded_up, to_floats
 from polytopes.exact_units import EvenRows, weights_of
 from polytopes.highs import HighsProgram
+from polytopes.rounding import check_rounding
 
 Indices = NDArray[np.int64]
 
@@ -264,6 +265,7 @@ class Program:
         ----------
         directions : array (k, n)
         """
+        check_rounding()
         program = self.balanced
         k = directions.shape[0]
         reduced, tops, constants = program._scaled_forms(directions)
@@ -465,6 +467,7 @@ def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
     ValueError
         If a hyperplane is too far from the origin, or units that even out the rows leave numbers that are no floats.
     """
+    check_rounding()
     units = None
     if d.size:
         row_units, units = kernel.exponents(np.vstack([A, C]), np.append(b, d))

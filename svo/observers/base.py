@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.rounding import check_rounding
 from svo.checks import Array, is_count
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
@@ -393,6 +394,7 @@ class Observer(ABC):
 
     def _ask(self, begun: float, schedule: Any, hook: Callable[[], Step]) -> Step:
         """The answer of a hook at the next sample."""
+        check_rounding()
         stopped = self.stopped
         self._number += 1
         try:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.rounding import check_rounding
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
 from svo.logs.drive import advance_to
@@ -266,6 +267,7 @@ class WindowObserver(Observer):
         expect_log(log)
         k, portion = 0, 1
         while k < len(log):
+            check_rounding()
             begun = perf_counter()
             samples = self._samples_at_once(log, k, portion)
             if samples is None:
