@@ -8,10 +8,11 @@ from typing import Annotated
 
 import typer
 
+import svo as face
 from svo.cli.destinations import writable_file, writable_folder
-from svo.cli.frame import announce, app, chosen_noise, measured_log, note, one_line_errors
+from svo.cli.frame import announce, app, chosen_noise, note, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName, positive
-from svo.cli.output import print_detection, print_json, say
+from svo.cli.output import print_json, say
 
 
 @app.command()
@@ -42,33 +43,23 @@ def detect(
     """
     from svo.cli.progress import progress
     from svo.detection.alarm_folder import check_no_results
-    from svo.detection.detect import detect as run_detection
-    from svo.detection.detect import write_detection
-    from svo.detection.thresholds import DetectsThresholds
-    from svo.plant import in_architecture
-    from svo.plant.description import check_kept_description, find_plant, keep_description
+    from svo.plant.description import check_kept_description
 
     if out is not None:
         check_no_results(out)
-    the_plant = in_architecture(find_plant(plant), architecture)
+    the_plant = face.find_plant(plant, architecture=architecture)
     if out is not None:
         check_kept_description(the_plant, out)
     noise = chosen_noise(the_plant, noise)
-    samples = measured_log(log, the_plant)
-    # First, for it takes no time, and what it may refuse would cost the bank's answer.
-    crossings = the_plant.detect_thresholds(samples) if isinstance(the_plant, DetectsThresholds) else None
+    samples = face.read_log(log, the_plant)
     with progress("Samples") as update:
-        found = run_detection(the_plant, samples, noise, source={"log": log.name}, progress=update)
-    beside = {} if crossings is None else {"interval_detector": crossings.to_dict()}
+        found = face.detect(the_plant, samples, noise, progress=update)
     if out is not None:
-        write_detection(out, found, beside)
-        keep_description(the_plant, out)
+        found.save(out)
     if as_json:
-        print_json(found.to_dict() | beside)
+        print_json(found.to_dict())
         return
-    print_detection(found)
-    if crossings is not None:
-        typer.echo(crossings.to_text())
+    typer.echo(str(found))
     if out is not None:
         say(f"Alarms with certificates: {out / 'alarms.jsonl'}")
 
@@ -122,9 +113,9 @@ def watch(
         from svo.detection.watch.state import resume_state, save_state
         from svo.detection.watch.view import view_of
         from svo.detection.watch.watch import watch as run_watch
-        from svo.plant.description import check_kept_description, find_plant, keep_description
+        from svo.plant.description import check_kept_description, keep_description
 
-        the_plant = find_plant(plant)
+        the_plant = face.find_plant(plant)
         noise = chosen_noise(the_plant, noise)
         lines = lines_of(log, until_end)
         session = Session(the_plant, noise, lines.name)
@@ -167,11 +158,10 @@ def calibrate(
       svo calibrate eclipse log.csv --noise quiet
     """
     from svo.detection.log_calibration import calibrate_log
-    from svo.plant.description import find_plant
 
-    the_plant = find_plant(plant)
+    the_plant = face.find_plant(plant)
     noise = chosen_noise(the_plant, noise)
-    samples = measured_log(log, the_plant)
+    samples = face.read_log(log, the_plant)
     announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
     found = calibrate_log(the_plant, samples, noise)
     if as_json:

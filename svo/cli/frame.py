@@ -13,9 +13,6 @@ from typer.core import TyperGroup
 from svo.terminal import ReaderGoneError, line, safe_output
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from svo.logs.log import Log
     from svo.plant import MonitoredPlant, Plant
 
 
@@ -117,31 +114,11 @@ def plant_to_simulate(name: str) -> Plant:
     return load_plant(name)
 
 
-def measured_log(path: Path, plant: MonitoredPlant) -> Log:
-    """A log to judge a plant by: sensors that it never measured are noted, and one has to be there."""
-    import numpy as np
-
-    from svo.logs.file import read_log
-
-    log = read_log(path, plant.columns, plant.Ts)
-    silent = [column.name for column, y in zip(plant.columns.outputs, log.y.T, strict=True) if np.isnan(y).all()]
-    if len(silent) == len(plant.columns.outputs):
-        raise ValueError(
-            f"{path} has no measurement: {', '.join(map(repr, silent))} empty in every row; expected numbers in one of "
-            "these columns at least"
-        )
-    for name in silent:
-        note(f"{path} has no measurement of {name!r}; nothing is concluded from that sensor")
-    return log
-
-
 def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:
     """The noise set that was named, or the plant's first."""
-    from svo.studies.configuration import check_noise
+    from svo.plant import chosen_noise as chosen
 
-    chosen = plant.noise_sets[0] if noise is None else noise
-    check_noise(plant, chosen)
-    return chosen
+    return chosen(plant, noise)
 
 
 def announce(what: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -15,14 +14,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from svo.analysis.isolability import Isolability
-    from svo.detection.detect import Detection
-    from svo.isolation import AlarmCheck
+    from svo.detection.verification import Verification
     from svo.plant import Plant
     from svo.studies.isolation.summary import ConditionSummary
     from svo.studies.thresholds.results import DetectionStudy
-
-
-_SHOWN = 20  # failed checks
 
 
 def describe(plant: Plant) -> dict[str, Any]:
@@ -91,31 +86,6 @@ def print_detector_study(found: DetectionStudy) -> None:
         say(f"{text[0].upper()}{text[1:]}.")
 
 
-def print_detection(found: Detection) -> None:
-    """What a bank found in a log."""
-    if found.detected_s is None:
-        say(f"No fault: the nominal model explains all {len(found.time)} samples ({found.noise} noise).")
-    else:
-        say(f"Fault detected at {found.detected_s:g} s: the nominal model is falsified ({found.noise} noise).")
-        if found.isolated_s is not None:
-            say(f"Fault isolated at {found.isolated_s:g} s: {found.record.fault}.")
-        elif found.alive:
-            say("Not isolated: more than one model explains the data.")
-    for alarm in found.alarms:
-        say(f"    {alarm.observer}: falsified at {alarm.time:g} s")
-    for name in found.alive:
-        again = ", begun again after it was falsified (recovery)" if name in found.restarted else ""
-        say(f"    {name}: explains the data to the end{again}")
-    if not found.alive:
-        say(f"No model explains the data from {max(alarm.time for alarm in found.alarms):g} s on.")
-    undecided = int(found.record.undecided.sum())
-    if undecided:
-        say(f"    undecided answers: {undecided}")
-    stopped = int(found.record.stopped.sum())
-    if stopped:
-        say(f"    programs that ended at a limit, so that sets are wider: {stopped}")
-
-
 def print_isolability(answer: Isolability) -> None:
     """Samples until each observer is surely falsified, fault by fault."""
     from rich.table import Table
@@ -134,13 +104,8 @@ def print_isolability(answer: Isolability) -> None:
     )
 
 
-def print_checks(path: Path, checks: Sequence[AlarmCheck]) -> None:
+def print_checks(found: Verification) -> None:
     """Alarms that failed, one a line on standard error, and how many were proven."""
-    failed = [check for check in checks if not check.ok]
-    for check in failed[:_SHOWN]:
-        whose = f" ({check.observer}, sample {check.sample})" if check.sample >= 0 else ""
-        say(f"{path}, line {check.line}{whose}: {check.reason}", err=True)
-    if len(failed) > _SHOWN:
-        say(f"{path}: {len(failed) - _SHOWN} more that failed (--json lists all)", err=True)
-    seconds = sum(check.seconds for check in checks)
-    say(f"{path}: {len(checks) - len(failed)} of {len(checks)} alarms proven in exact arithmetic, in {seconds:.2f} s")
+    for text in found.failures:
+        say(text, err=True)
+    say(found.summary)

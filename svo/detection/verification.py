@@ -1,133 +1,164 @@
-"""Proofs of stored alarms from the first sample of their log on (``svo verify --full``)."""
+"""Alarms checked again: stored ones, or those of a detection that is at hand."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
+from typing import Any
 
-from svo.detection.detect import digest_of_alarm
-from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
-from svo.logs.drive import drive
+from polytopes.signatures import options_by_name
+from svo.checks import expect_kind
+from svo.detection.chains import PlantModels, with_chains
+from svo.detection.found import Detection
+from svo.isolation import Alarm, AlarmCheck, check_alarm, read_alarms, verify_alarms
 from svo.logs.log import Log
-from svo.models import ModelSample
-from svo.observers.window.chain import promises_of, prover_of, proving, start_of
-from svo.observers.window.observer import WindowObserver
-from svo.plant import MonitoredPlant, in_architecture
-from svo.plant.scheduling import scheduled
+from svo.plant import MonitoredPlant
+from svo.plant.description import find_plant
+from svo.plant.log_file import read_log
+from svo.terminal import line
+
+_SHOWN = 20  # failed checks
 
 
-class PlantModels:
-    """Compares the models of alarms with those of the plant's banks, at the scheduling values of a log.
-
-    Parameters
-    ----------
-    plant : MonitoredPlant
-    log : Log
-        Only time, u and y are used; the plant's own scheduler makes the schedule of them.
+@dataclass(frozen=True, repr=False)
+class Verification:
+    """What came of checking alarms; printed, it says what ``svo verify`` says.
 
     Attributes
     ----------
-    log : Log
-        With that schedule.
+    about : str
+        What was checked: the file, or the detection.
+    checks : tuple of AlarmCheck
+        One an alarm, in their order.
     """
 
-    def __init__(self, plant: MonitoredPlant, log: Log) -> None:
-        self._plant = plant
-        self.log = scheduled(plant.scheduler(), log)
+    about: str
+    checks: tuple[AlarmCheck, ...]
 
-    def bank(self, alarm: Alarm) -> Bank:
-        """A fresh bank of the architecture and noise set that an alarm names."""
-        architecture = alarm.source.get("architecture")
-        chosen = in_architecture(self._plant, None if architecture is None else str(architecture))
-        return chosen.bank(str(alarm.source.get("noise")))
+    @property
+    def ok(self) -> bool:
+        """Whether there is an alarm, and every one is proven."""
+        return bool(self.checks) and self.proven == len(self.checks)
 
-    def difference(self, alarm: Alarm) -> str | None:
-        """How an alarm's matrices, bounds and digest are not those of the plant's observer that it names, or None."""
-        observer = self.bank(alarm).observers.get(alarm.observer)
-        if observer is None:
-            return f"the plant's bank has no model {alarm.observer!r:.80}"
-        claimed = alarm.certificate.model_data()
-        first = alarm.sample + 1 - len(claimed)
-        right = [ModelSample.of(observer.model, self.log.schedule_at(first + i)) for i in range(len(claimed))]
-        for k, (mine, its) in enumerate(zip(claimed, right, strict=True), start=first):
-            what = mine.difference(its)
-            if what is not None:
-                return f"the {what} of sample {k} differs from that of the plant's model {alarm.observer!r}"
-        # The certificate's numbers are the plant's by now, so only sizes, sampling time and options can differ.
-        if alarm.model is not None and alarm.model != digest_of_alarm(observer, alarm.certificate):
-            return f"the digest is not that of the plant's observer {alarm.observer!r}: it has other options or bounds"
-        return None
+    @property
+    def proven(self) -> int:
+        """How many of the alarms are."""
+        return sum(check.ok for check in self.checks)
+
+    @property
+    def summary(self) -> str:
+        """How many were proven, in one line."""
+        if not self.checks:
+            return f"{self.about}: there is no alarm, so there is nothing to prove"
+        seconds = sum(check.seconds for check in self.checks)
+        proven = f"{self.proven} of {len(self.checks)} alarms proven in exact arithmetic"
+        return f"{self.about}: {proven}, in {seconds:.2f} s"
+
+    @property
+    def failures(self) -> list[str]:
+        """The alarms that are not proven and why, a line each; of many, the first."""
+        failed = [check for check in self.checks if not check.ok]
+        more = [f"{self.about}: {len(failed) - _SHOWN} more that failed (--json lists all)"] if failed[_SHOWN:] else []
+        return [f"{self.about}, {_which(check)}: {check.reason}" for check in failed[:_SHOWN]] + more
+
+    def to_dict(self) -> list[dict[str, Any]]:
+        """The checks for JSON, without their times."""
+        return [
+            {"line": c.line, "observer": c.observer, "sample": c.sample, "ok": c.ok, "reason": c.reason}
+            for c in self.checks
+        ]
+
+    def __str__(self) -> str:
+        return "\n".join(line(text) for text in (*self.failures, self.summary))
+
+    def __repr__(self) -> str:
+        return f"<Verification of {line(self.summary):.300}>"
 
 
-def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:
-    """Check every stored alarm and, if it holds, run its bank over the log again and prove every bound of its observer.
+def _which(check: AlarmCheck) -> str:
+    whose = f"{check.observer}, sample {check.sample}"
+    if not check.line:
+        return whose
+    return f"line {check.line}" + (f" ({whose})" if check.sample >= 0 else "")
 
-    The observers are those of the plant's bank for the noise set and architecture that the alarm names, and the
-    alarm's model must be the plant's. An observer that starts during the run, as those of class II do, is
-    proven from the set that it starts from: a constant set as given, that of a global observer with its own proof.
-    Bounds are proven over convex hulls; an alarm that only a split by signs gives fails, and the reason says so.
+
+@options_by_name
+def verify(
+    alarms: Detection | str | Path,
+    log: Log | str | Path | None = None,
+    *,
+    full: bool = False,
+    plant: MonitoredPlant | None = None,
+) -> Verification:
+    """Check alarms: the digest of those stored, each proof in exact arithmetic, and data and model if the log is given.
+
+    A window's proof is conditional on the set of states at its start, and on the model that is stored with it; with a
+    log that is compared with the plant's.
 
     Parameters
     ----------
-    path : path
-        JSON Lines, as `svo.isolation.alarms.write_alarms` writes them; all alarms of one run.
-    log : Log
-        Only time, u and y are used; the plant's own scheduler makes the schedule from y.
-    plant : MonitoredPlant
+    alarms : Detection or path
+        What `svo.detect` found, or an alarms.jsonl.
+    log : Log or path, optional
+        The log that stored alarms are of; a detection brings its own.
+    full : bool
+        Also prove every bound from the first sample of the log to each alarm, by the plant's observers run over it
+        again (some seconds an alarm).
+    plant : MonitoredPlant, optional
+        The one that stored alarms are of; by default it is found by its name, a description beside them.
+
+    Returns
+    -------
+    Verification
+        Printed, it says how many alarms are proven, and why others are not.
+
+    Raises
+    ------
+    TypeError
+        If ``alarms`` is neither a detection nor a path.
+    ValueError
+        If the file is none of alarms, or has those of several runs and a log is given, if the plant is not found, and
+        for ``full`` without a log, or a log or plant beside a detection.
+    OSError
+        If a file cannot be opened.
     """
-    models = PlantModels(plant, log)
-    checks = verify_alarms(path, log, models.difference)
-    if not all(check.ok for check in checks):
-        return checks
-    return [_with_chain(check, alarm, models) for check, alarm in zip(checks, read_alarms(path), strict=True)]
+    expect_kind("alarms", alarms, (Detection, str, Path), "what svo.detect gives, or the path of an alarms.jsonl")
+    if not isinstance(alarms, Detection):
+        return _verified_file(Path(alarms), log, full, plant)
+    if log is not None or plant is not None:
+        raise ValueError("log or plant is given beside a detection, which has its own; leave them out")
+    models = PlantModels(alarms.plant, alarms.log)
+    checks = [check_alarm(alarm, alarms.log, models.difference) for alarm in alarms.alarms]
+    about = f"alarms of {alarms.log.source or 'the log'}"
+    return Verification(about, _completed(checks, alarms.alarms, models, full))
 
 
-def _with_chain(check: AlarmCheck, alarm: Alarm, models: PlantModels) -> AlarmCheck:
-    begun = perf_counter()
-    ok, reason = _prove(models.bank(alarm), alarm, models.log)
-    return replace(check, ok=ok, reason=reason, seconds=check.seconds + perf_counter() - begun)
+def _verified_file(path: Path, log: Log | str | Path | None, full: bool, plant: MonitoredPlant | None) -> Verification:
+    if log is None and full:
+        raise ValueError("full is True and there is no log; give the log that the alarms are of")
+    alarms = [] if log is None else _of_one_run(path)
+    if log is None or not alarms:
+        return Verification(str(path), tuple(verify_alarms(path)))
+    # A description lies beside the alarms, where `Detection.save` put it.
+    found = plant or find_plant(str(alarms[0].source.get("plant")), path.parent)
+    data = log if isinstance(log, Log) else read_log(log, found)
+    models = PlantModels(found, data)
+    return Verification(str(path), _completed(verify_alarms(path, data, models.difference), alarms, models, full))
 
 
-def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
-    replaced: dict[str, WindowObserver] = {}
-    splits: dict[str, int] = {}
-    for name in (alarm.observer, *(n for n in bank.observers if n == GLOBAL)):
-        observer = bank.observers.get(name)
-        if not isinstance(observer, WindowObserver):
-            kind = "none of that name" if observer is None else f"a {type(observer).__name__}"
-            return False, f"only bounds of window observers can be proven; the plant's bank has {kind} for {name!r}"
-        replaced[name], splits[name] = proving(observer), observer.sign_split
-    bank.exchange(replaced)
-    started, fell = _replay(bank, alarm.observer, log)
-    if fell != alarm.sample:
-        found = "not falsified" if fell is None else f"falsified at sample {fell}"
-        split = " over convex hulls, not split by signs as the plant's is," if splits[alarm.observer] else ""
-        return False, f"run again over the log{split} the plant's observer is {found}"
-    provers = [prover_of(observer) for observer in replaced.values()]
-    unproven, bounds = [what for p in provers for what in p.unproven], sum(p.checked for p in provers)
-    if unproven:
-        return False, f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}"
-    own = replaced[alarm.observer]
-    again, promises = start_of(own, started), "".join(f" and {promise}" for promise in promises_of(own))
-    if again is not None:
-        return True, f"proven over {bounds} bounds, given {again}{promises}"
-    if started == 0:
-        return True, f"proven from the first sample, over {bounds} bounds" + promises.replace(" and", ", given", 1)
-    given = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
-    return True, f"proven from its start at sample {started} over {bounds} bounds, given {given}{promises}"
+def _completed(
+    checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: PlantModels, full: bool
+) -> tuple[AlarmCheck, ...]:
+    """The checks, with chains of bounds if all hold and these are asked for."""
+    return tuple(with_chains(checks, alarms, models) if full and all(check.ok for check in checks) else checks)
 
 
-def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None]:
-    """Sample at which the observer last started, and at which its model was declared falsified."""
-    started, ran = 0, False
-    for verdict in drive(bank, log):
-        step = verdict.steps.get(name)
-        if step is not None and not ran:
-            started = verdict.sample
-        # One that fell and starts again begins with what it knows after this sample.
-        ran = step is not None and step.verdict != "falsified"
-        alive = name in verdict.alive if name != GLOBAL else verdict.state != "unexplained"
-        if not alive:
-            return started, verdict.sample
-    return started, None
+def _of_one_run(path: Path) -> list[Alarm]:
+    """The alarms of a file, which a log can be given for."""
+    alarms = read_alarms(path)
+    if any(alarm.source != alarms[0].source for alarm in alarms):
+        raise ValueError(
+            f"{path} has alarms of several runs, and a log is that of one; give the alarms of that run alone"
+        )
+    return alarms

@@ -1,6 +1,6 @@
 """Isolation banks: observers of several models beside one another, what they conclude, and alarms with their proofs."""
 
-from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms, write_alarms
+from svo.isolation.alarms import Alarm, AlarmCheck, check_alarm, read_alarms, verify_alarms, write_alarms
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
 from svo.isolation.logic import GLOBAL, NOMINAL
@@ -17,6 +17,7 @@ __all__ = [
     "BankRecord",
     "Recorder",
     "Verdict",
+    "check_alarm",
     "read_alarms",
     "verify_alarms",
     "write_alarms",

@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -110,7 +110,7 @@ def verify_alarms(
     log : Log, optional
     model_difference : callable, optional
         An alarm to the way in which its model is not the one that it names, or None, as
-        `svo.detection.verification.PlantModels` gives it. Asked only where the log is given.
+        `svo.detection.chains.PlantModels` gives it. Asked only where the log is given.
 
     Raises
     ------
@@ -150,6 +150,12 @@ def _check(number: int, text: str, log: Log | None, model_difference: ModelDiffe
         alarm = _decode(text)
     except _BadRecord as error:
         return AlarmCheck(number, "?", -1, False, str(error), perf_counter() - begun)
+    return replace(check_alarm(alarm, log, model_difference), line=number, seconds=perf_counter() - begun)
+
+
+def check_alarm(alarm: Alarm, log: Log | None = None, model_difference: ModelDifference | None = None) -> AlarmCheck:
+    """Check an alarm that is at hand, its line then 0; as `verify_alarms` does each that is stored."""
+    begun = perf_counter()
     compared = ", data as in the log"
     if not alarm.certificate.verify():
         wrong: str | None = "the proof does not hold"
@@ -161,7 +167,7 @@ def _check(number: int, text: str, log: Log | None, model_difference: ModelDiffe
             wrong = wrong or model_difference(alarm)
             compared += ", model as the plant's" if alarm.model else ", model not compared beyond matrices and bounds"
     reason = wrong or f"proven given {alarm.certificate.premise(alarm.sample)}{compared}"
-    return AlarmCheck(number, alarm.observer, alarm.sample, wrong is None, reason, perf_counter() - begun)
+    return AlarmCheck(0, alarm.observer, alarm.sample, wrong is None, reason, perf_counter() - begun)
 
 
 def _difference(alarm: Alarm, log: Log) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,8 @@ class BankRecord:
         FIRST sample of the run at which a fault was detected, and at which one was isolated.
     fault : str or None
         The fault that was isolated then.
+    verdict : Verdict
+        The bank's conclusion at the last sample, without steps.
     global_seconds : (K,) array or None
         Wall time of the global observer's step, NaN where it was not stepped; None if the bank has none.
     """
@@ -88,6 +90,7 @@ class BankRecord:
     detected_at: int | None
     isolated_at: int | None
     fault: str | None
+    verdict: Verdict
     global_seconds: NDArray[np.float64] | None = None
 
 
@@ -107,10 +110,11 @@ class Recorder:
         self._isolated_at: int | None = None
         self._fault: str | None = None
         self._global_seconds: NDArray[np.float64] | None = None
+        self._verdict: Verdict
 
     def add(self, verdict: Verdict, samples: int = 1) -> None:
         """The next sample; or the next ``samples``, of whose last the verdict is and at which nothing changed."""
-        k = verdict.sample
+        k, self._verdict = verdict.sample, verdict
         rows = slice(k + 1 - samples, k + 1)
         self._states += [verdict.state] * samples
         for i, name in enumerate(self._names):
@@ -151,5 +155,6 @@ class Recorder:
             detected_at=self._detected_at,
             isolated_at=self._isolated_at,
             fault=self._fault,
+            verdict=replace(self._verdict, steps={}),
             global_seconds=self._global_seconds,
         )

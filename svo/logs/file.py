@@ -6,6 +6,7 @@ The rules for the columns are those of `svo.logs.columns`. In each format floats
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -72,7 +73,7 @@ def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
     expect(is_finite_number(Ts) and Ts > 0, "Ts", Ts, "a positive sampling time in seconds")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; expected a log file, one of {', '.join(_FORMATS)}")
-    return _format(path).read(path, columns, Ts)
+    return replace(_format(path).read(path, columns, Ts), source=path.name)
 
 
 def check_suffix(path: str | Path) -> None:

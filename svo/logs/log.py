@@ -32,6 +32,8 @@ class Log:
         True states, known in simulation only.
     schedule : (K, ...) array, optional
         Scheduling value at each sample; None for plants without one.
+    source : str, optional
+        Where it comes from, such as the name of its file: stored with the alarms that it raises.
     """
 
     time: Array
@@ -40,6 +42,7 @@ class Log:
     _: KW_ONLY
     x: Array | None = None
     schedule: Array | None = None
+    source: str | None = None
 
     def __post_init__(self) -> None:
         time = real_array("time", self.time, ("K",), finite=False)
@@ -168,6 +171,6 @@ class Log:
 
 def expect_log(log: Any) -> None:
     """Refuse what is no log, or has no samples."""
-    expect_kind("log", log, Log, "an svo.Log, such as svo.logs.file.read_log gives")
+    expect_kind("log", log, Log, "an svo.Log, such as svo.read_log gives")
     if len(log) == 0:
         raise ValueError("log has no samples; expected at least one")

@@ -266,12 +266,24 @@ def first_faulty_sample(plant: Plant, fault: str, profile: str, time: NDArray[np
     return round((fault_start(plant, fault, profile) - float(time[0])) / plant.Ts)
 
 
+def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:
+    """The ``noise`` set that was named, or the first of a ``plant``.
+
+    Raises
+    ------
+    ValueError
+        If the plant has none of that name.
+    """
+    chosen = plant.noise_sets[0] if noise is None else noise
+    if chosen not in plant.noise_sets:
+        raise ValueError(f"plant {plant.name!r} has no noise set {chosen!r}; it has {', '.join(plant.noise_sets)}")
+    return chosen
+
+
 def expect_plant(plant: Any) -> None:
     """Raise a TypeError for what is no plant, such as its name or its class."""
     if not isinstance(plant, type) and callable(getattr(plant, "bank", None)):
         return
     if isinstance(plant, str | Path):
-        raise TypeError(
-            f"plant is {str(plant)!r}; expected a plant, such as svo.plant.description.find_plant({str(plant)!r}) gives"
-        )
+        raise TypeError(f"plant is {str(plant)!r}; expected a plant, such as svo.find_plant({str(plant)!r}) gives")
     raise TypeError(f"plant is {type(plant).__name__}; expected a plant (svo.plant.Plant), which has a bank(noise)")

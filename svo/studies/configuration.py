@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from svo.checks import expect
-from svo.plant import HEALTHY, MonitoredPlant, Plant, architecture_of, in_architecture
+from svo.plant import HEALTHY, Plant, architecture_of, chosen_noise, in_architecture
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class StudyConfiguration:
         noise = tuple(noise) or plant.noise_sets[:1]
         faults = tuple(faults) or (HEALTHY, *plant.faults)
         for name in noise:
-            check_noise(plant, name)
+            chosen_noise(plant, name)
         for name in faults:
             if name != HEALTHY:
                 check_fault(plant, name)
@@ -169,12 +169,6 @@ def _check_kind(name: str, value: Any, kind: str) -> None:
 def conditions(plant: Plant) -> list[tuple[str, str]]:
     """(fault, profile) of a plant, ("none", "none") first."""
     return [(HEALTHY, HEALTHY), *((fault, profile) for fault, profiles in plant.faults.items() for profile in profiles)]
-
-
-def check_noise(plant: MonitoredPlant, noise: str) -> None:
-    """Raise a ValueError if the plant has no noise set of that name."""
-    if noise not in plant.noise_sets:
-        raise ValueError(f"plant {plant.name!r} has no noise set {noise!r}; it has {', '.join(plant.noise_sets)}")
 
 
 def check_fault(plant: Plant, fault: str, profile: str | None = None) -> None:

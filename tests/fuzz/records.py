@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from svo.detection.chains import PlantModels
 from svo.detection.detect import detect
-from svo.detection.verification import PlantModels
 from svo.isolation.alarms import Alarm, read_alarms, verify_alarms, write_alarms
 from svo.isolation.bank import Bank
 from svo.logs.drive import drive

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import svo
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, WindowObserver
 
@@ -31,18 +30,6 @@ def cart_observer() -> WindowObserver:
 
 
 # -- the face --------------------------------------------------------------------------------------------------------
-
-
-@later("C", ValueError, "the fourth positional argument of a model is E, not D")
-def test_what_follows_C_is_given_by_name() -> None:
-    with pytest.raises(TypeError):
-        UncertainModel([[1.0]], [[1.0]], [[1.0]], E=[[1.0]])
-
-
-@later("C", AssertionError, "the main verbs are not to be had from Python")
-@pytest.mark.parametrize("name", ["find_plant", "read_log", "detect", "verify"])
-def test_the_main_verbs_are_functions_of_the_package(name: str) -> None:
-    assert callable(getattr(svo, name, None))
 
 
 @later("C", AttributeError, "a record does not say when its model was falsified")

@@ -19,7 +19,7 @@ NAMES = {
     "polytopes": ["HPolytope"],
     "svo": [
         "ArchitectureI", "ArchitectureII", "ConstrainedZonotopeObserver", "PolytopeObserver", "UncertainModel",
-        "Uncertainty", "WindowObserver",
+        "Uncertainty", "WindowObserver", "detect", "find_plant", "read_log", "verify",
     ],
     "svo.plant": ["Plant"],
     "svo.faults": ["ActuatorFault", "Exponential", "Intermittent", "PlantFault", "Ramp", "SensorFault", "Step"],
@@ -67,6 +67,11 @@ def test_the_arguments_are_there(thing: object, arguments: list[str]) -> None:
 @pytest.mark.parametrize("name", HPOLYTOPE)
 def test_the_set_has_the_operation(name: str) -> None:
     assert callable(getattr(HPolytope, name))
+
+
+def test_what_follows_C_is_given_by_name() -> None:
+    with pytest.raises(TypeError, match="D="):
+        UncertainModel([[1.0]], [[1.0]], [[1.0]], [[1.0]])  # type: ignore[misc]
 
 
 def test_every_public_name_exists() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.detection.detect import digest_of_alarm, source_of_bank
+from svo.detection.bank_alarms import digest_of_alarm, source_of_bank
 from svo.detection.watch.lines import Line, Notice
 from svo.detection.watch.rows import RowReader
 from svo.detection.watch.timeline import Event, Row, Timeline

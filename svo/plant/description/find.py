@@ -6,23 +6,42 @@ import shutil
 from functools import partial
 from pathlib import Path
 
-from svo.plant import MonitoredPlant, load_plant, registered_plants
+from polytopes.signatures import options_by_name
+from svo.checks import expect_kind
+from svo.plant import MonitoredPlant, in_architecture, load_plant, registered_plants
 from svo.plant.description.plant import DescribedPlant, read_description
 from svo.store import digest_of, write_whole
 
 SUFFIX = ".toml"
 
 
-def find_plant(name: str, folder: Path = Path()) -> MonitoredPlant:
-    """The plant described in ``name`` if that ends in .toml (relative to ``folder``), else the registered one.
+@options_by_name
+def find_plant(name: str | Path, folder: str | Path = "", *, architecture: str | None = None) -> MonitoredPlant:
+    """A plant by the path of the TOML file that describes it, or by the name under which it is registered.
+
+    Parameters
+    ----------
+    name : str or path
+        One that ends in .toml is a file.
+    folder : path
+        What the path is relative to; the present folder by default.
+    architecture : str, optional
+        Of the bank, such as "I" or "II", where the plant offers a choice; by default the plant's own.
 
     Raises
     ------
+    TypeError
+        If the name is no text and no path.
     ValueError
-        If no plant is registered by that name, or the description has a mistake.
+        If no plant is registered by that name, the description has a mistake, or there is no such architecture.
     OSError
         If the file cannot be opened.
     """
+    expect_kind("name", name, (str, Path), "the name of a registered plant, or the path of a TOML file")
+    return in_architecture(_found(str(name), Path(folder)), architecture)
+
+
+def _found(name: str, folder: Path) -> MonitoredPlant:
     if name.endswith(SUFFIX):
         return read_description(folder / name)
     if name not in registered_plants() and (folder / name).is_file():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from svo.detection.detect import alarms_of, source_of_bank
+from svo.detection.bank_alarms import alarms_of, source_of_bank
 from svo.indices import judge_alarm
 from svo.isolation import Alarm, BankRecord
 from svo.logs.log import Log

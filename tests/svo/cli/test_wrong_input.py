@@ -12,7 +12,7 @@ import pytest
 
 from polytopes import HPolytope
 from svo import Log, UncertainModel, WindowObserver, calibrate, prove_chain
-from svo.detection.detect import detect, write_detection
+from svo.detection.detect import detect
 from svo.detection.log_calibration import calibrate_log
 from svo.faults import ActuatorFault, PlantFault, SensorFault, Step
 from svo.logs.file import read_log
@@ -34,7 +34,7 @@ LOG = read_log(EXAMPLES / "cart.csv", CART.columns, CART.Ts)
         (lambda: replace(LOG, u=LOG.u[:, :0]), "u of the log has 0 channels; expected 1"),
         (lambda: Log(LOG.time[:0], LOG.u[:0], LOG.y[:0]), "log has no samples"),
         (lambda: LOG.to_dataframe(CART.columns), "log is a DataFrame; expected an svo.Log"),
-        (lambda: "cart.csv", "log is a str; expected an svo.Log, such as svo.logs.file.read_log gives"),
+        (lambda: "cart.csv", "log is a str; expected an svo.Log, such as svo.read_log gives"),
     ],
 )
 def test_a_log_that_is_none_of_the_plant_is_refused(
@@ -113,7 +113,7 @@ def test_a_frame_is_no_log() -> None:
 
 
 def test_a_name_is_no_plant_and_a_text_no_sampling_time() -> None:
-    with pytest.raises(TypeError, match=r"plant is 'cart.toml'; .* svo.plant.description.find_plant\('cart.toml'\)"):
+    with pytest.raises(TypeError, match=r"plant is 'cart.toml'; .* svo.find_plant\('cart.toml'\)"):
         detect("cart.toml", LOG, "stated")  # type: ignore[arg-type]
     for wrong in ("10 ms", 0.0, float("nan")):
         with pytest.raises(ValueError, match=r"Ts is .*; expected a positive sampling time in seconds"):
@@ -121,5 +121,5 @@ def test_a_name_is_no_plant_and_a_text_no_sampling_time() -> None:
 
 
 def test_findings_go_to_a_folder_named_by_text(tmp_path: Path) -> None:
-    write_detection(str(tmp_path / "found"), detect(CART, LOG, "stated"))
+    detect(CART, LOG).save(str(tmp_path / "found"))
     assert (tmp_path / "found" / "alarms.jsonl").exists()

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from svo.cli import app
 from svo.detection.alarm_folder import watch_folder
-from svo.detection.detect import detect, write_detection
+from svo.detection.detect import detect
 from svo.isolation.alarms import Alarm, alarm_line, verify_alarms
 from svo.logs.file import read_log
 from svo.plant.description import keep_description, read_description
@@ -64,7 +64,7 @@ def test_a_folder_with_results_of_any_command_is_refused_and_stays(tmp_path: Pat
         assert name in message
         assert "give another folder" in message or "symbolic link" in message
     with pytest.raises(ValueError, match="never overwritten"):
-        write_detection(out, detect(PLANT, read_log(LOG, PLANT.columns, PLANT.Ts), "stated"))
+        detect(PLANT, read_log(LOG, PLANT.columns, PLANT.Ts)).save(out)
     assert content(tmp_path) == before
     assert not (tmp_path / "nothing").exists()
 

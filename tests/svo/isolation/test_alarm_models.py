@@ -16,8 +16,9 @@ from typer.testing import CliRunner
 from polytopes import HPolytope
 from svo import ArchitectureI, ConstrainedZonotopeObserver, PolytopeObserver, WindowObserver
 from svo.cli import app
-from svo.detection.detect import alarms_of, detect
-from svo.detection.verification import PlantModels, verify_chains
+from svo.detection.bank_alarms import alarms_of
+from svo.detection.chains import PlantModels, verify_chains
+from svo.detection.detect import detect
 from svo.isolation.alarms import Alarm, AlarmCheck, read_alarms, verify_alarms, write_alarms
 from svo.logs.file import read_log
 from svo.logs.log import Log
@@ -121,7 +122,7 @@ def test_every_kind_of_observer_is_compared(tmp_path: Path, kind: Any) -> None:
 
 
 def test_the_digest_tells_options_and_sampling_time_apart(cart: tuple[Any, Log, tuple[Alarm, ...]]) -> None:
-    from svo.detection.detect import digest_of_alarm
+    from svo.detection.bank_alarms import digest_of_alarm
 
     plant, _, alarms = cart
     model = plant.bank("stated").observers["nominal"].model

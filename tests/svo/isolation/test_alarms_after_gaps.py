@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from svo.detection.detect import detect, write_detection
-from svo.detection.verification import verify_chains
+from svo.detection.chains import verify_chains
+from svo.detection.detect import detect
 from svo.isolation.alarms import verify_alarms
 from svo.logs.log import Log
 from svo.plant.description import read_description
@@ -40,7 +40,7 @@ def checked(tmp_path: Path, promise: str, after: list[float]) -> tuple[str, str]
     log = Log(np.arange(float(len(y))), np.zeros((len(y), 0)), y)
     found = detect(plant, log, "stated")
     assert len(found.alarms) == 1
-    write_detection(tmp_path / "out", found)
+    found.save(tmp_path / "out")
     alarms = tmp_path / "out" / "alarms.jsonl"
     (plain,), (full,) = verify_alarms(alarms, log), verify_chains(alarms, log, plant)
     assert plain.ok, plain.reason

@@ -13,7 +13,7 @@ from stored_alarms import CART, VARIANTS, X0, biased, stored, tampered
 
 from polytopes import HPolytope
 from svo import ArchitectureI, PolytopeObserver, UncertainModel, WindowObserver
-from svo.detection.detect import alarms_of
+from svo.detection.bank_alarms import alarms_of
 from svo.isolation.alarms import Alarm, alarm_line, read_alarms, verify_alarms
 from svo.logs.log import Log
 

@@ -13,7 +13,7 @@ import stored_alarms
 from stored_alarms import CART, VARIANTS, X0, biased, same, stored, tampered
 
 from svo import ArchitectureI, ConstrainedZonotopeObserver, UncertainModel, WindowObserver
-from svo.detection.detect import alarms_of
+from svo.detection.bank_alarms import alarms_of
 from svo.isolation.alarms import Alarm, read_alarms, verify_alarms
 from svo.logs.log import Log
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -17,8 +18,8 @@ from rich.console import Console
 from rotating_logger import Logger
 from typer.testing import CliRunner
 
+from svo import detect, read_log
 from svo.cli import app
-from svo.detection.detect import detect
 from svo.detection.watch.follow import FileLines
 from svo.detection.watch.lines import Line
 from svo.detection.watch.rows import RowReader
@@ -28,7 +29,6 @@ from svo.detection.watch.timeline import Timeline
 from svo.detection.watch.view import PlainView
 from svo.detection.watch.watch import watch
 from svo.isolation.alarms import Alarm
-from svo.logs.file import read_log
 from svo.plant.description import read_description
 
 CART = Path(__file__).parents[4] / "docs" / "examples" / "cart.toml"
@@ -191,7 +191,7 @@ def test_a_process_that_is_killed_and_started_again_loses_and_invents_nothing(tm
     text = said.read_text()
     assert "Traceback" not in text
     assert "Interrupted: 80 samples" in text.splitlines()[-1]
-    found = detect(PLANT, read_log(LOG, PLANT.columns, PLANT.Ts), "stated", source={"log": "log.csv"})
+    found = detect(PLANT, replace(read_log(LOG, PLANT), source="log.csv"))
     assert len((tmp_path / "out" / "alarms.jsonl").read_text().splitlines()) == len(found.alarms) == 2
     full = CliRunner().invoke(app, ["verify", str(tmp_path / "out" / "alarms.jsonl"), "--full", str(LOG)])
     assert full.exit_code == 0, full.output

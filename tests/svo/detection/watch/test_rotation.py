@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rotating_logger import Logger
 
+from svo import detect, read_log
 from svo.detection.alarm_folder import watch_folder
-from svo.detection.detect import detect
 from svo.detection.watch.follow import FileLines
 from svo.detection.watch.session import Session, identity_of
 from svo.detection.watch.state import resume_state, save_state
 from svo.isolation.alarms import alarm_line
-from svo.logs.file import read_log
 from svo.plant.description import read_description
 
 CART = Path(__file__).parents[4] / "docs" / "examples" / "cart.toml"
@@ -26,7 +25,7 @@ PLANT = read_description(CART)
 
 
 def expected() -> list[str]:
-    found = detect(PLANT, read_log(LOG, PLANT.columns, PLANT.Ts), "stated", source={"log": "log.csv"})
+    found = detect(PLANT, replace(read_log(LOG, PLANT), source="log.csv"))
     return sorted(alarm_line(alarm) for alarm in found.alarms)
 
 

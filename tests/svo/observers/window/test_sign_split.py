@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver
-from svo.detection.detect import alarms_of
-from svo.detection.verification import verify_chains
+from svo.detection.bank_alarms import alarms_of
+from svo.detection.chains import verify_chains
 from svo.isolation.alarms import Alarm, verify_alarms, write_alarms
 from svo.logs.drive import drive
 from svo.logs.log import Log

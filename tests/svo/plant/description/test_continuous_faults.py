@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from svo import UncertainModel, Uncertainty
+from svo.detection.chains import verify_chains
 from svo.detection.detect import detect
-from svo.detection.verification import verify_chains
 from svo.faults import ActuatorFault, FaultPair, PlantFault, SensorFault, Step
 from svo.isolation.alarms import write_alarms
 from svo.logs.log import Log

@@ -159,7 +159,7 @@ def test_what_the_interval_detector_refuses_costs_no_answer_of_the_bank(tmp_path
     """It is asked first: the bank's whole run was lost before."""
     plant = described(tmp_path, ("learn_until_s = 3.0", "learn_until_s = 99.0"))
     write_log(tmp_path / "log.csv", run_of(100, 0), plant.columns)
-    monkeypatch.setattr("svo.detection.detect.detect", lambda *_, **__: pytest.fail("the bank ran before"))
+    monkeypatch.setattr("svo.isolation.bank.Bank.run", lambda *_, **__: pytest.fail("the bank ran before"))
     done = CliRunner().invoke(app, ["detect", str(tmp_path / "servo.toml"), str(tmp_path / "log.csv")])
     assert done.exit_code == 1
     assert "learn_until_s is 99 s" in done.stderr

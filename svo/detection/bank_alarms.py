@@ -1,0 +1,42 @@
+"""The alarms of a bank's run, and what says of each which bank it is from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from svo.isolation import Alarm, BankRecord
+from svo.logs.log import Log
+from svo.models import model_digest
+from svo.observers.base import Certificate, Observer
+from svo.plant import MonitoredPlant, architecture_of
+
+
+def alarms_of(
+    record: BankRecord,
+    log: Log,
+    source: Mapping[str, str | int | float],
+    observers: Mapping[str, Observer] | None = None,
+) -> tuple[Alarm, ...]:
+    """Every certified falsification of a record, in order of time.
+
+    With the ``observers`` of the bank each alarm carries the digest of its model.
+    """
+    died = sorted((sample, name) for name, sample in record.died_at.items() if sample is not None)
+    alarms = []
+    for k, name in died:
+        proof = record.certificates[name]
+        assert proof is not None  # banks take no falsification without one
+        model = None if observers is None else digest_of_alarm(observers[name], proof)
+        alarms.append(Alarm(name, k, float(log.time[k]), proof, source, model))
+    return tuple(alarms)
+
+
+def digest_of_alarm(observer: Observer, certificate: Certificate) -> str:
+    """Digest of an observer's model and options with the numbers that a certificate holds of it."""
+    return model_digest(observer.model, observer.options, certificate.model_data())
+
+
+def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:
+    """Which bank an alarm comes from, as stored with it: the plant and, if it offers a choice, the architecture."""
+    architecture = architecture_of(plant)
+    return {"plant": plant.name} | ({} if architecture is None else {"architecture": architecture})

@@ -1,0 +1,137 @@
+"""Proofs of alarms from the first sample of their log on (``svo verify --full``), by the observers of their plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from svo.detection.bank_alarms import digest_of_alarm
+from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
+from svo.logs.drive import drive
+from svo.logs.log import Log
+from svo.models import ModelSample
+from svo.observers.window.chain import promises_of, prover_of, proving, start_of
+from svo.observers.window.observer import WindowObserver
+from svo.plant import MonitoredPlant, in_architecture
+from svo.plant.scheduling import scheduled
+
+
+class PlantModels:
+    """Compares the models of alarms with those of the plant's banks, at the scheduling values of a log.
+
+    Parameters
+    ----------
+    plant : MonitoredPlant
+    log : Log
+        Only time, u and y are used; the plant's own scheduler makes the schedule of them.
+
+    Attributes
+    ----------
+    log : Log
+        With that schedule.
+    """
+
+    def __init__(self, plant: MonitoredPlant, log: Log) -> None:
+        self._plant = plant
+        self.log = scheduled(plant.scheduler(), log)
+
+    def bank(self, alarm: Alarm) -> Bank:
+        """A fresh bank of the architecture and noise set that an alarm names."""
+        architecture = alarm.source.get("architecture")
+        chosen = in_architecture(self._plant, None if architecture is None else str(architecture))
+        return chosen.bank(str(alarm.source.get("noise")))
+
+    def difference(self, alarm: Alarm) -> str | None:
+        """How an alarm's matrices, bounds and digest are not those of the plant's observer that it names, or None."""
+        observer = self.bank(alarm).observers.get(alarm.observer)
+        if observer is None:
+            return f"the plant's bank has no model {alarm.observer!r:.80}"
+        claimed = alarm.certificate.model_data()
+        first = alarm.sample + 1 - len(claimed)
+        right = [ModelSample.of(observer.model, self.log.schedule_at(first + i)) for i in range(len(claimed))]
+        for k, (mine, its) in enumerate(zip(claimed, right, strict=True), start=first):
+            what = mine.difference(its)
+            if what is not None:
+                return f"the {what} of sample {k} differs from that of the plant's model {alarm.observer!r}"
+        # The certificate's numbers are the plant's by now, so only sizes, sampling time and options can differ.
+        if alarm.model is not None and alarm.model != digest_of_alarm(observer, alarm.certificate):
+            return f"the digest is not that of the plant's observer {alarm.observer!r}: it has other options or bounds"
+        return None
+
+
+def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:
+    """Check every stored alarm and, if it holds, run its bank over the log again and prove every bound of its observer.
+
+    The observers are those of the plant's bank for the noise set and architecture that the alarm names, and the
+    alarm's model must be the plant's. An observer that starts during the run, as those of class II do, is
+    proven from the set that it starts from: a constant set as given, that of a global observer with its own proof.
+    Bounds are proven over convex hulls; an alarm that only a split by signs gives fails, and the reason says so.
+
+    Parameters
+    ----------
+    path : path
+        JSON Lines, as `svo.isolation.alarms.write_alarms` writes them; all alarms of one run.
+    log : Log
+        Only time, u and y are used; the plant's own scheduler makes the schedule from y.
+    plant : MonitoredPlant
+    """
+    models = PlantModels(plant, log)
+    checks = verify_alarms(path, log, models.difference)
+    return with_chains(checks, read_alarms(path), models) if all(check.ok for check in checks) else checks
+
+
+def with_chains(checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: PlantModels) -> list[AlarmCheck]:
+    """Checks of alarms that hold, each with what is proven of its observer's bounds."""
+    return [_with_chain(check, alarm, models) for check, alarm in zip(checks, alarms, strict=True)]
+
+
+def _with_chain(check: AlarmCheck, alarm: Alarm, models: PlantModels) -> AlarmCheck:
+    begun = perf_counter()
+    ok, reason = _prove(models.bank(alarm), alarm, models.log)
+    return replace(check, ok=ok, reason=reason, seconds=check.seconds + perf_counter() - begun)
+
+
+def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
+    replaced: dict[str, WindowObserver] = {}
+    splits: dict[str, int] = {}
+    for name in (alarm.observer, *(n for n in bank.observers if n == GLOBAL)):
+        observer = bank.observers.get(name)
+        if not isinstance(observer, WindowObserver):
+            kind = "none of that name" if observer is None else f"a {type(observer).__name__}"
+            return False, f"only bounds of window observers can be proven; the plant's bank has {kind} for {name!r}"
+        replaced[name], splits[name] = proving(observer), observer.sign_split
+    bank.exchange(replaced)
+    started, fell = _replay(bank, alarm.observer, log)
+    if fell != alarm.sample:
+        found = "not falsified" if fell is None else f"falsified at sample {fell}"
+        split = " over convex hulls, not split by signs as the plant's is," if splits[alarm.observer] else ""
+        return False, f"run again over the log{split} the plant's observer is {found}"
+    provers = [prover_of(observer) for observer in replaced.values()]
+    unproven, bounds = [what for p in provers for what in p.unproven], sum(p.checked for p in provers)
+    if unproven:
+        return False, f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}"
+    own = replaced[alarm.observer]
+    again, promises = start_of(own, started), "".join(f" and {promise}" for promise in promises_of(own))
+    if again is not None:
+        return True, f"proven over {bounds} bounds, given {again}{promises}"
+    if started == 0:
+        return True, f"proven from the first sample, over {bounds} bounds" + promises.replace(" and", ", given", 1)
+    given = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
+    return True, f"proven from its start at sample {started} over {bounds} bounds, given {given}{promises}"
+
+
+def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None]:
+    """Sample at which the observer last started, and at which its model was declared falsified."""
+    started, ran = 0, False
+    for verdict in drive(bank, log):
+        step = verdict.steps.get(name)
+        if step is not None and not ran:
+            started = verdict.sample
+        # One that fell and starts again begins with what it knows after this sample.
+        ran = step is not None and step.verdict != "falsified"
+        alive = name in verdict.alive if name != GLOBAL else verdict.state != "unexplained"
+        if not alive:
+            return started, verdict.sample
+    return started, None

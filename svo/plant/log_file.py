@@ -1,0 +1,57 @@
+"""A plant's log from a file."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from svo.logs import file
+from svo.logs.columns import LogNote
+from svo.logs.log import Log
+from svo.plant.protocol import MonitoredPlant, expect_plant
+
+
+def read_log(path: str | Path, plant: MonitoredPlant) -> Log:
+    """A log to judge a plant by.
+
+    Parameters
+    ----------
+    path : path of a .csv, .parquet or .mat file
+        With the plant's columns, under the rules of `svo.logs.columns`.
+    plant : MonitoredPlant
+        As `svo.find_plant` gives it: its columns and sampling time.
+
+    Returns
+    -------
+    Log
+        Without a schedule: the plant's scheduler makes it from y, sample by sample.
+
+    Warns
+    -----
+    LogNote
+        Of a sensor without any measurement, and whatever else was read in a way that its reader should know of.
+
+    Raises
+    ------
+    TypeError
+        If the plant is a name.
+    ValueError
+        Naming the file, the line or sample and the column, with what was found and what was expected; and if no
+        sensor has a measurement.
+    OSError
+        If the file cannot be opened.
+    """
+    expect_plant(plant)
+    log = file.read_log(path, plant.columns, plant.Ts)
+    silent = [column.name for column, y in zip(plant.columns.outputs, log.y.T, strict=True) if np.isnan(y).all()]
+    if len(silent) == len(plant.columns.outputs):
+        raise ValueError(
+            f"{path} has no measurement: {', '.join(map(repr, silent))} empty in every row; expected numbers in one of "
+            "these columns at least"
+        )
+    for name in silent:
+        said = f"{path} has no measurement of {name!r}; nothing is concluded from that sensor"
+        warnings.warn(said, LogNote, stacklevel=2)
+    return log
