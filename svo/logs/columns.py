@@ -90,13 +90,18 @@ def checked_parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts:
     ValueError
         Naming the source, the sample and the column.
     """
+    check_cells(source, cells, columns, lambda k: f"sample {k}")
+    return parts(source, cells, columns, Ts, lambda k: f"sample {k}")
+
+
+def check_cells(source: str, cells: Mapping[str, Array], columns: Columns, place: Place) -> None:
+    """Raise a ValueError if a cell is infinite, or missing where that has no meaning."""
     unknown = may_be_missing(columns)
     for name, values in cells.items():
         bad = np.isinf(values) | (np.isnan(values) & (name not in unknown))
-        for k in np.flatnonzero(bad)[:1]:
-            where = f"{source}, sample {k}, column {name!r}"
+        for k in np.flatnonzero(bad)[:1].tolist():
+            where = f"{source}, {place(k)}, column {name!r}"
             raise not_there(where) if np.isnan(values[k]) else not_finite(where, float(values[k]))
-    return parts(source, cells, columns, Ts, lambda k: f"sample {k}")
 
 
 def parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float, place: Place) -> dict[str, Any]:

@@ -6,19 +6,22 @@ Floats are written in their shortest form that reads back to the same bits.
 from __future__ import annotations
 
 import csv
-import io
 import math
-import warnings
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
-from svo.logs.columns import Array, LogNote, may_be_missing, not_finite, not_there, parts, wanted_columns
-from svo.logs.log import Log
+from svo.logs.columns import Array, may_be_missing, not_finite, not_there, wanted_columns
+from svo.logs.lines import Lines
 from svo.logs.names import Columns
+from svo.logs.portions import Rows
+from svo.logs.quick_csv import quick_columns
+
+BLOCK = 1 << 20
 
 
 def write_csv(path: Path, cells: Mapping[str, Array]) -> None:
@@ -30,40 +33,58 @@ def write_csv(path: Path, cells: Mapping[str, Array]) -> None:
             writer.writerow("" if math.isnan(value) else repr(value) for value in row)
 
 
-def read_csv(path: Path, columns: Columns, Ts: float) -> Log:
-    """Read a log; errors name the line and the column.
+def read_csv(path: Path, columns: Columns, *, block: int = BLOCK, quick_from: int = BLOCK) -> Iterator[Rows]:
+    """The rows of a log, a block of the file at a time; errors name the line and the column.
 
     A last line without its end is no sample: nobody can tell "2" from the beginning of "2.638". It is left out with a
     `LogNote`.
+
+    Parameters
+    ----------
+    path : path
+    columns : Columns
+    block : int
+        Bytes to read at once.
+    quick_from : int
+        Bytes from which on a file is worth loading pyarrow for, if it is installed. What is read does not depend on it.
     """
-    with io.TextIOWrapper(_complete_lines(path), newline="", encoding="utf-8-sig") as file, csv_errors(str(path)):
-        rows = _rows(file)
-        parser = RowParser(str(path), next(rows, (0, []))[1], columns)
-        lines, values = [], []
-        for line, row in rows:
-            lines.append(line)
-            values.append(parser.parse(line, row))
+    with path.open("rb") as file, csv_errors(str(path)):
+        lines = Lines(str(path), file, block)
+        header = next((row for row in csv.reader(lines, **DIALECT) if row), [])
+        parser = RowParser(str(path), header, columns)
+        is_long = os.fstat(file.fileno()).st_size > quick_from
+        while lines.block():
+            quick = _quick_rows(lines, parser) if is_long else None
+            yield from _rows(lines, parser) if quick is None else [quick]
+
+
+def _quick_rows(lines: Lines, parser: RowParser) -> Rows | None:
+    """The next block of lines, if it is an ordinary one with all cells that must be there."""
+    numbers = quick_columns(lines.block(), parser.width, parser.positions)
+    if numbers is None or not parser.may_be(numbers):
+        return None
+    first = lines.number + 1
+    lines.take_block()
+    return Rows(dict(zip(parser.names, numbers, strict=True)), lambda k: f"line {first + k}")
+
+
+def _rows(lines: Lines, parser: RowParser) -> Iterator[Rows]:
+    """The rows of the next block of lines, and the rest of a row that goes on in the one behind it."""
+    numbers, values = [], []
+    wrong: Exception | None = None
+    try:
+        for row in csv.reader(lines, **DIALECT):
+            if row:
+                values.append(parser.parse(lines.number, row))
+                numbers.append(lines.number)
+            if lines.is_between_blocks:
+                break
+    except (ValueError, csv.Error) as error:
+        wrong = error  # first those before it, in which something else may be wrong
     table = np.array(values).reshape(-1, len(parser.names))
-    cells = {name: table[:, i].copy() for i, name in enumerate(parser.names)}
-    return Log(**parts(str(path), cells, columns, Ts, lambda k: f"line {lines[k]}"))
-
-
-def _complete_lines(path: Path) -> io.BytesIO:
-    """The bytes of a file up to the end of its last line that has one, or all of its only line."""
-    data = path.read_bytes()
-    end = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1 or len(data)  # one line is a header, whole or not: no sample
-    if data[end:].strip():
-        lines = data.count(b"\n", 0, end) or data.count(b"\r", 0, end)
-        warnings.warn(f"{path}: {no_end(lines + 1)}", LogNote, stacklevel=4)
-    return io.BytesIO(data[:end])
-
-
-def no_end(line: int) -> str:
-    """What is said of a last line that may be cut."""
-    return (
-        f"the last line ({line}) has no end and was left out, since it may be cut; "
-        "if it is whole, put a line break behind it"
-    )
+    yield Rows({name: table[:, i].copy() for i, name in enumerate(parser.names)}, lambda k: f"line {numbers[k]}")
+    if wrong is not None:
+        raise wrong
 
 
 DIALECT: dict[str, Any] = {"strict": True, "skipinitialspace": True}  # of `csv.reader`
@@ -76,6 +97,10 @@ class RowParser:
     ----------
     names : list of str
         The columns that are read: time, inputs, outputs and, if all are there, states.
+    positions : list of int
+        Where they stand.
+    width : int
+        Cells of a row.
     """
 
     def __init__(self, source: str, header: Sequence[str], columns: Columns) -> None:
@@ -84,8 +109,8 @@ class RowParser:
         present = [name.strip() for name in header]
         _check_separator(source, present, columns)
         self.names = wanted_columns(source, present, columns)
-        self._source, self._width = source, len(present)
-        self._where = [present.index(name) for name in self.names]
+        self._source, self.width = source, len(present)
+        self.positions = [present.index(name) for name in self.names]
         unknown = may_be_missing(columns)
         self._may_be_missing = [name in unknown for name in self.names]
 
@@ -97,15 +122,19 @@ class RowParser:
         ValueError
             Naming the line and the column.
         """
-        if len(row) != self._width:
-            raise ValueError(f"{self._source}, line {line}: {len(row)} cells; expected {self._width}, as in the header")
-        return [self._number(line, i, row[position]) for i, position in enumerate(self._where)]
+        if len(row) != self.width:
+            raise ValueError(f"{self._source}, line {line}: {len(row)} cells; expected {self.width}, as in the header")
+        return [self._number(line, i, row[position]) for i, position in enumerate(self.positions)]
+
+    def may_be(self, columns: Sequence[Array]) -> bool:
+        """Whether NaN stands in these columns only where it has a meaning."""
+        return all(may or not np.isnan(c).any() for may, c in zip(self._may_be_missing, columns, strict=True))
 
     def readable(self, row: Sequence[str]) -> list[float] | None:
         """The numbers of a row in which not every cell is one, NaN elsewhere; None if its cells can't be told apart."""
-        if len(row) != self._width:
+        if len(row) != self.width:
             return None
-        return [number if math.isfinite(number := _number(row[at])) else math.nan for at in self._where]
+        return [number if math.isfinite(number := _number(row[at])) else math.nan for at in self.positions]
 
     def _number(self, line: int, i: int, cell: str) -> float:
         value = _number(cell)
@@ -147,11 +176,3 @@ def csv_errors(source: str) -> Iterator[None]:
         raise ValueError(
             f"{source} is not a CSV text file ({error}); expected comma-separated columns in UTF-8"
         ) from error
-
-
-def _rows(file: TextIO) -> Iterator[tuple[int, list[str]]]:
-    """Line numbers and cells of the rows that are not blank."""
-    reader = csv.reader(file, **DIALECT)
-    for row in reader:
-        if row:
-            yield reader.line_num, row

@@ -5,7 +5,7 @@ The rules for the columns are those of `svo.logs.columns`. In each format floats
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -16,10 +16,11 @@ from svo.logs.log import Log
 from svo.logs.mat import read_mat_log, write_mat
 from svo.logs.names import Columns
 from svo.logs.parquet import read_parquet, write_parquet
+from svo.logs.portions import Rows, joined, portions_of
 
 
 class _Format(NamedTuple):
-    read: Callable[[Path, Columns, float], Log]
+    read: Callable[[Path, Columns], Iterator[Rows]]
     write: Callable[..., None]
 
 
@@ -69,11 +70,20 @@ def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
     ImportError
         If the format needs a package that is not installed.
     """
+    return joined(list(read_portions(path, columns, Ts)))
+
+
+def read_portions(path: str | Path, columns: Columns, Ts: float) -> Iterator[Log]:
+    """A log in portions, one after the other, so that it need not be in memory as a whole; a MAT file is one portion.
+
+    Arguments and errors are those of `read_log`; an error comes when its portion is asked for.
+    """
     path = Path(path)
     expect(is_finite_number(Ts) and Ts > 0, "Ts", Ts, "a positive sampling time in seconds")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; expected a log file, one of {', '.join(_FORMATS)}")
-    return replace(_format(path).read(path, columns, Ts), source=path.name)
+    rows = _format(path).read(path, columns)
+    yield from (replace(portion, source=path.name) for portion in portions_of(str(path), rows, columns, Ts))
 
 
 def check_suffix(path: str | Path) -> None:

@@ -6,13 +6,13 @@ Other variables, such as the scalars of a test's settings, are ignored.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from svo.logs.columns import Array, wanted_columns
-from svo.logs.log import Log
+from svo.logs.columns import Array, check_cells, wanted_columns
 from svo.logs.mat_file import MatFile
 from svo.logs.names import Columns
+from svo.logs.portions import Rows, samples_from
 
 _VARIABLE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
 
@@ -36,8 +36,8 @@ def write_mat(path: Path, cells: Mapping[str, Array]) -> None:
     savemat(path, {name: values[:, None] for name, values in cells.items()}, appendmat=False)
 
 
-def read_mat_log(path: Path, columns: Columns, Ts: float) -> Log:
-    """Read a log; errors name the sample and the variable."""
+def read_mat_log(path: Path, columns: Columns) -> Iterator[Rows]:
+    """The rows of a log, all at once; errors name the sample and the variable."""
     file = MatFile.open(path)
     needed = (columns.time, *(c.name for c in columns.inputs + columns.outputs))
     for name, kind in file.kinds.items():
@@ -53,4 +53,6 @@ def read_mat_log(path: Path, columns: Columns, Ts: float) -> Log:
                 f"{path}, variable {name!r} has shape {shape}; expected a vector of {samples} samples, as "
                 f"{columns.time!r} has"
             )
-    return Log.from_columns(str(path), {name: variables[name].ravel() for name in names}, columns, Ts)
+    cells, place = {name: variables[name].ravel() for name in names}, samples_from(0)
+    check_cells(str(path), cells, columns, place)
+    yield Rows(cells, place)

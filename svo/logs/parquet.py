@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from svo.checks import optional_import
-from svo.logs.columns import Array, wanted_columns
-from svo.logs.log import Log
+from svo.logs.arrow import numbers_of
+from svo.logs.columns import Array, check_cells, wanted_columns
 from svo.logs.names import Columns
+from svo.logs.portions import Rows, samples_from
 from svo.store.unpacking import check_unpacked
+
+ROWS = 1 << 15
 
 
 def write_parquet(path: Path, cells: Mapping[str, Array]) -> None:
@@ -22,23 +23,36 @@ def write_parquet(path: Path, cells: Mapping[str, Array]) -> None:
     parquet.write_table(arrow.table(dict(cells)), path, write_page_checksum=True)
 
 
-def read_parquet(path: Path, columns: Columns, Ts: float) -> Log:
-    """Read a log; errors name the sample and the column."""
+def read_parquet(path: Path, columns: Columns, *, rows: int = ROWS) -> Iterator[Rows]:
+    """The rows of a log, so many at a time; errors name the sample and the column."""
     arrow, parquet = _arrow()
     with path.open("rb") as file:
         with _one_error(path, arrow):
             source = parquet.ParquetFile(file, page_checksum_verification=True)
-            schema, rows = source.schema_arrow, source.metadata.num_rows
+            schema, samples = source.schema_arrow, int(source.metadata.num_rows)
         names = wanted_columns(str(path), schema.names, columns)
         for name in names:
             kind = schema.field(name).type
             if not (arrow.types.is_integer(kind) or arrow.types.is_floating(kind)):
                 raise ValueError(f"{path}, column {name!r} has the type {kind}; expected numbers")
-        check_unpacked(path, 8 * max(int(rows), 0) * len(names))
+        check_unpacked(path, 8 * max(samples, 0) * len(names))
+        first = 0
+        for cells in _batches(path, arrow, source.iter_batches(rows, columns=names), names):
+            place = samples_from(first)
+            check_cells(str(path), cells, columns, place)
+            yield Rows(cells, place)
+            first += len(cells[columns.time])
+
+
+def _batches(path: Path, arrow: Any, batches: Iterator[Any], names: Sequence[str]) -> Iterator[dict[str, Array]]:
+    """The numbers of each batch by column, with one kind of error for what is damaged."""
+    while True:
         with _one_error(path, arrow):
-            table = source.read(columns=names)
-            cells = {name: np.array(table.column(name).to_numpy(), dtype=float) for name in names}
-    return Log.from_columns(str(path), cells, columns, Ts)
+            batch = next(batches, None)
+            if batch is None:
+                return
+            cells = {name: numbers_of(batch.column(name)) for name in names}
+        yield cells
 
 
 @contextmanager

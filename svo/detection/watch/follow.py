@@ -21,7 +21,7 @@ from typing import Any, BinaryIO
 
 from svo.detection.watch.lines import CHUNK, Line, Lines, Notice, Splitter
 from svo.detection.watch.stream import StreamLines
-from svo.logs.csv import no_end
+from svo.logs.lines import no_end
 
 POLL_SECONDS = 0.005
 _FINGERPRINT = 512  # bytes at the beginning, and as many before the position

@@ -11,7 +11,7 @@ from time import monotonic
 from typing import Any
 
 from svo.detection.watch.lines import CHUNK, Line, Notice, Splitter
-from svo.logs.csv import no_end
+from svo.logs.lines import no_end
 
 
 class StreamLines:
