@@ -8,6 +8,7 @@ expected, and what to do.
 
 import math
 import operator
+import sys
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -22,7 +23,6 @@ Item = TypeVar("Item")
 _EXACT = 2**53  # integers up to here are floats
 _NUMBERS = "biuf"  # kinds of dtypes: truth values, integers, floats
 _PLAIN = (np.matrix, np.memmap)  # subclasses of arrays that mean no more than their numbers
-_MASKED = type(np.ma.masked)
 _ADVICE = {
     "c": "Take the real part (.real) if the imaginary part is rounding",
     "m": "Divide by a unit: value / numpy.timedelta64(1, 's')",
@@ -124,6 +124,11 @@ def _is_float_array(value: Any) -> bool:
     return type(value) is np.ndarray and value.dtype == np.float64
 
 
+def _masked() -> tuple[type, ...]:
+    """The classes of masked arrays: none while nobody has loaded their module, which takes time."""
+    return (np.ma.MaskedArray, type(np.ma.masked)) if "numpy.ma" in sys.modules else ()
+
+
 def _converted(name: str, value: Any, missing: bool) -> Floats:
     """The numbers of anything but a plain array of floats."""
     if type(value) is int:
@@ -135,7 +140,7 @@ def _converted(name: str, value: Any, missing: bool) -> Floats:
         ]
         return np.stack(columns, axis=1) if columns else np.empty(value.shape)
     _refuse_what_loses_its_meaning(name, value)
-    if isinstance(value, np.ma.MaskedArray):
+    if isinstance(value, _masked()):
         return _filled(name, value, missing)
     raw = _as_numpy(name, value)
     listed = isinstance(value, list | tuple)
@@ -156,7 +161,7 @@ def _refuse_what_loses_its_meaning(name: str, value: Any) -> None:
     numeric = getattr(getattr(value, "dtype", None), "kind", "f") in _NUMBERS
     if numeric and (hasattr(value, "units") or hasattr(value, "unit")):
         raise TypeError(f"{what} with a unit; expected plain numbers. Convert it, and take its numbers.")
-    if isinstance(value, np.ndarray) and type(value) not in (np.ndarray, *_PLAIN, np.ma.MaskedArray, _MASKED):
+    if isinstance(value, np.ndarray) and type(value) not in (np.ndarray, *_PLAIN, *_masked()):
         raise TypeError(f"{what}; expected a plain array. Use numpy.asarray if only its numbers count.")
 
 
@@ -232,7 +237,7 @@ def _leaves(name: str, values: Iterable[Any], missing: bool) -> list[float]:
             found.append(_float_of(name, v))
         elif isinstance(v, list | tuple):
             found += _leaves(name, v, missing)
-        elif v is None or v is np.ma.masked or type(v).__name__ == "NAType":
+        elif v is None or type(v).__name__ in ("NAType", "MaskedConstant"):
             if not missing:
                 raise ValueError(f"{name} has a missing entry ({v!r}); expected numbers. Remove or replace it.")
             found.append(math.nan)

@@ -1,5 +1,7 @@
 """`HPolytope`: the set ``{x : A x <= b, C x = d}`` as an immutable value; a thin face over the operations."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
 from typing import Any, Self
@@ -203,7 +205,7 @@ class HPolytope(Rows):
         return affine_dim(self)
 
     @options_by_name
-    def contains(self, x: "ArrayLike | Rows", *, tol: float = 1e-9) -> bool | NDArray[np.bool_]:
+    def contains(self, x: ArrayLike | Rows, *, tol: float = 1e-9) -> bool | NDArray[np.bool_]:
         """Whether a point (n,), each of k points (k, n), or a whole set lies inside.
 
         Parameters

@@ -1,5 +1,7 @@
 """Random points of bounded sets."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from polytopes.affine_hull import explicit

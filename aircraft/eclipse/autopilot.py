@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.noise import NoiseSet
@@ -25,6 +24,8 @@ def design_autopilot(noise: NoiseSet, Ts: float, surrogate: Surrogate, derivativ
     The plant model is the corrected published one, discretised exactly. The estimate used at a sample
     includes the measurement of that sample.
     """
+    from scipy.linalg import solve_discrete_are  # imported here: detection designs no autopilot
+
     trim = level_trim(surrogate, DESIGN_AIRSPEED)
     A, B, C, E = discrete_model(derivatives, trim, surrogate, Ts)
     cost = solve_discrete_are(A, B, STATE_WEIGHT, INPUT_WEIGHT)

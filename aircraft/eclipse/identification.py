@@ -61,16 +61,15 @@ def identify() -> Identification:
 
 def _errors(surrogate: Surrogate, derivatives: Derivatives) -> tuple[tuple[str, ...], Array]:
     """Relative errors (airspeeds, derivatives) of the surrogate's linearisation."""
-    linear = [linearise(surrogate, level_trim(surrogate, V)) for V in AIRSPEEDS]
+    linear = linearise(surrogate, level_trim(surrogate, AIRSPEEDS))
     names, columns = [], []
     for row, axis in ((0, "X"), (1, "Z"), (3, "M")):
         for which, suffixes in ((0, ("u", "w", "theta", "q")), (1, ("eta",))):
             for column, suffix in enumerate(suffixes):
                 name = f"{axis}_{suffix}"
                 published = derivatives.value(name, AIRSPEEDS)
-                fitted = np.array([matrices[which][row, column] for matrices in linear])
                 names.append(name)
-                columns.append((fitted - published) / np.sqrt(np.mean(published**2)))
+                columns.append((linear[which][:, row, column] - published) / np.sqrt(np.mean(published**2)))
     return tuple(names), np.column_stack(columns)
 
 

@@ -84,25 +84,27 @@ class ScheduledModel:
         """A, B, a, E, C, c, and the direction of the dynamics fault, over 25 to 55 m/s."""
         low, high = VALID_AIRSPEED
         airspeeds = np.linspace(low, high, round((high - low) / SPACING) + 1)
-        points = [self._point(float(V)) for V in airspeeds]
-        tables = {name: np.array([point[name] for point in points]) for name in points[0]}
-        return ScheduledBlocks(low, SPACING, tables)
+        return ScheduledBlocks(low, SPACING, self._tables(airspeeds))
 
-    def _point(self, airspeed: float) -> dict[str, Array]:
-        trim = level_trim(self.surrogate, airspeed)
-        speed_moment = np.zeros((4, 1))
-        speed_moment[3] = SPEED_MOMENT_INCREASE * self.derivatives.value("M_u", airspeed)
-        columns = np.hstack([self.derivatives.B(airspeed), gust_directions(self.surrogate), speed_moment])
-        A, held = zero_order_hold(self.derivatives.A(airspeed), columns, self.Ts)
-        C, B, channel = output_matrix(trim), held[:, :2], held[:, 5]
+    def _tables(self, airspeeds: Array) -> dict[str, Array]:
+        """Each block (points, ...) at airspeeds (points,)."""
+        trim, points = level_trim(self.surrogate, airspeeds), len(airspeeds)
+        speed_moment = np.zeros((points, 4, 1))
+        speed_moment[:, 3, 0] = SPEED_MOMENT_INCREASE * self.derivatives.value("M_u", airspeeds)
+        gusts = np.broadcast_to(gust_directions(self.surrogate), (points, 4, 3))
+        columns = np.concatenate([self.derivatives.B(airspeeds), gusts, speed_moment], axis=-1)
+        continuous = zip(self.derivatives.A(airspeeds), columns, strict=True)
+        A, held = map(np.array, zip(*(zero_order_hold(*pair, self.Ts) for pair in continuous), strict=True))
+        C, B, channel = output_matrix(trim), held[..., :2], held[..., 5]
+        x, u = trim.x[..., None], trim.u[..., None]
         return {
             "A": A,
             "B": B,
-            "a": trim.x - A @ trim.x - B @ trim.u,
-            "E": np.hstack([held[:, 2:5], np.eye(4)]),
+            "a": (x - A @ x - B @ u)[..., 0],
+            "E": np.concatenate([held[..., 2:5], np.broadcast_to(np.eye(4), (points, 4, 4))], axis=-1),
             "C": C,
-            "c": trim.y - C @ trim.x,
-            "moment": np.outer(channel, [1.0, 0.0, 0.0, 0.0]),
+            "c": trim.y - (C @ x)[..., 0],
+            "moment": channel[..., None] * [1.0, 0.0, 0.0, 0.0],
             "moment_offset": -channel * self.moment_reference,
         }
 

@@ -125,7 +125,7 @@ class Scenarios:
         rng = np.random.default_rng(seed)
         sensor_noise, gusts = chosen("noise", noise, NOISE_SETS).draw(samples, self.model.Ts, rng, self.distribution)
         corruption = corrupt(active, time, self.model.moment_reference)
-        start = level_trim(self.model.surrogate, DESIGN_AIRSPEED).x
+        start = _start(self.model.surrogate)
         controller = _autopilot(noise, self.model.Ts, self.model.surrogate)
         superposed = None if excitation is None else self._from_fault(excitation, samples)
         surrogate, Ts = self.model.surrogate, self.model.Ts
@@ -157,6 +157,11 @@ def corrupt(fault: Fault | None, time: Array, moment_reference: float) -> Corrup
         return Corruption(healthy.bias, effectiveness, healthy.moment)
     moment = SPEED_MOMENT_INCREASE * fault.delta(time)
     return Corruption(healthy.bias, healthy.effectiveness, moment, moment_reference)
+
+
+@cache
+def _start(surrogate: Surrogate) -> Array:
+    return level_trim(surrogate, DESIGN_AIRSPEED).x
 
 
 @cache

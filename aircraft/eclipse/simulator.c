@@ -42,10 +42,13 @@ static void derivative(const Surrogate *s, const SpeedMoment *of_speed, double i
     out[5] = x[0] * sine_theta - x[1] * cosine_theta;
 }
 
-EXPORTED void fdi_eclipse_derivative(const Surrogate *s, const double *x, const double *u, const double *d, double *out)
+/* d/dt (K, 6) at states x (K, 6), inputs u (K, 2) and disturbances d (K, 3). */
+EXPORTED void fdi_eclipse_derivative(integer rows, const Surrogate *s, const double *x, const double *u,
+                                     const double *d, double *out)
 {
     const SpeedMoment none = {{0.0, 0.0, 0.0}, 0.0};
-    derivative(s, &none, 0.0, x, u, d, out);
+    for (integer k = 0; k < rows; k++)
+        derivative(s, &none, 0.0, x + STATES * k, u + 2 * k, d + 3 * k, out + STATES * k);
 }
 
 static void stage(const double *x, double factor, const double *slope, double *out)

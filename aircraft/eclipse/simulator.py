@@ -20,6 +20,7 @@ of q u corrected. The elevator zero cannot be identified from derivatives; Cm0 =
 
 from __future__ import annotations
 
+import math
 from dataclasses import astuple, dataclass, fields
 
 import numpy as np
@@ -39,7 +40,7 @@ from polytopes.native import Entries, Given, Integer, Real, floats, function
 
 Array = NDArray[np.float64]
 
-_derivative = function("fdi_eclipse_derivative", *[Given] * 4, Entries)
+_derivative = function("fdi_eclipse_derivative", Integer, *[Given] * 4, Entries)
 _fly = function("fdi_eclipse_fly", Integer, Real, *[Given] * 9, *[Entries] * 3)
 
 
@@ -76,11 +77,14 @@ class Surrogate:
         return np.array([*astuple(self), self.M_wdot, force, moment, CHORD / 2, GRAVITY, thrust, thrust_moment])
 
     def derivative(self, x: ArrayLike, u: ArrayLike, d: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-        """d/dt [u, w, theta, q] at state x (4,), input [eta deg, tau] and disturbance [d_u, d_w, d_q]."""
-        state, out = np.zeros(6), np.empty(6)
-        state[:4] = x
-        _derivative(self.packed(), state, floats(u), floats(d), out)
-        return out[:4]
+        """d/dt [u, w, theta, q] at states x (..., 4), inputs [eta deg, tau] and disturbances [d_u, d_w, d_q]."""
+        x, u, d = floats(x), floats(u), floats(d)
+        shape = np.broadcast_shapes(x.shape[:-1], u.shape[:-1], d.shape[:-1])
+        state, out = np.zeros((*shape, 6)), np.empty((*shape, 6))
+        state[..., :4] = x
+        given = [np.broadcast_to(array, (*shape, array.shape[-1])) for array in (u, d)]
+        _derivative(math.prod(shape), self.packed(), state, *given, out)
+        return out[..., :4]
 
 
 @dataclass(frozen=True)

@@ -43,12 +43,13 @@ def plants(as_json: AsJson = False) -> None:
     Example:
       svo plants
     """
-    from svo.plant import load_plant, registered_plants
+    from svo.plant import registered_plants
+    from svo.plant.registry import made_by
 
     every = []
-    for name in registered_plants():
+    for name, loader in registered_plants().items():
         try:
-            every.append(load_plant(name))
+            every.append(made_by(loader, name))
         except (ImportError, TypeError) as error:  # one that is broken hides no other
             typer.echo(f"note: {error}", err=True)
     if as_json:

@@ -13,6 +13,7 @@ from flint import arb, arb_mat, ctx
 from polytopes.exact import ball_matrix, ball_up
 from svo.checks import Array
 
+_FEW_BITS = 128  # of an exponential, twice as many where they lose too much
 _BITS = 512  # states in units of 2^-80 to 2^80 keep a float's digits
 _MOST_BITS = 8192
 _PARTS = 16  # of a sample, more where it is long against the dynamics
@@ -21,7 +22,7 @@ _MOST_PARTS = 1024
 
 def exponential(M: Array, Ts: float) -> Array:
     """exp(M Ts), every entry the nearest float, so that units which are powers of two scale it to the bit."""
-    bits = _BITS
+    bits = _FEW_BITS
     while True:
         with ctx.workprec(bits):
             entries = (ball_matrix(M) * arb(Ts)).exp().tolist()

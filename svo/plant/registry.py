@@ -30,8 +30,13 @@ def load_plant(name: str) -> Plant:
     if name not in loaders:
         known = ", ".join(loaders) or "none"
         raise ValueError(f"no plant is registered as {name!r} in the entry-point group svo.plants; registered: {known}")
+    return made_by(loaders[name], name)
+
+
+def made_by(loader: Callable[[], Any], name: str) -> Plant:
+    """The plant of one of the `registered_plants`; errors as of `load_plant`."""
     try:
-        factory: Any = loaders[name]()
+        factory: Any = loader()
     except (ImportError, AttributeError) as error:
         raise ImportError(f"plant {name!r} of group svo.plants cannot be loaded: {error}") from error
     plant = factory() if callable(factory) and not isinstance(factory, Plant) else factory

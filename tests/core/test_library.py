@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
+from benchmarks.cold_start import SVO, turns, write_log
 from polytopes.native import PATH
 from tests.core.disassembly import fused_instructions
 
@@ -29,11 +31,29 @@ def test_a_missing_library_is_one_error_that_says_what_to_do() -> None:
     assert "pip install" in done.stderr
 
 
-def test_the_first_detection_loads_nothing_that_it_does_not_need() -> None:
-    heavy = ("scipy.stats", "scipy.signal", "pandas", "matplotlib", "cvxpy", "dask", "numba", "llvmlite")
+HEAVY = (
+    "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.sparse", "scipy.spatial", "scipy.special", "scipy.stats",
+    "cvxpy", "dask", "highspy", "jinja2", "llvmlite", "matplotlib", "numba", "numpy.ma", "pandas", "pyarrow", "rich",
+)  # fmt: skip
+
+
+def test_a_detection_loads_nothing_that_it_does_not_need(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    write_log(log)
     code = (
-        "import sys; from svo.plant.registry import load_plant; from svo.detection.detect import detect; "
-        "plant = load_plant('eclipse'); plant.bank(plant.noise_sets[0]); plant.scheduler(); "
-        f"print([name for name in {heavy} if name in sys.modules])"
+        "import sys; from svo.cli import app; "
+        f"app(['detect', 'eclipse', {str(log)!r}, '--out', {str(tmp_path / 'found')!r}], standalone_mode=False); "
+        f"print([name for name in {HEAVY} if name in sys.modules])"
     )
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    *answer, loaded = done.stdout.splitlines()
+    assert "Fault isolated at 0.5 s: alpha." in answer
+    assert loaded == "[]"
+
+
+def test_a_detection_takes_at_most_three_times_the_import_of_what_it_stands_on(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    write_log(log)
+    command = (*SVO, "detect", "eclipse", str(log))
+    turns(command, tmp_path / "bytecode", 1)
+    assert min(ours / theirs for ours, theirs in turns(command, tmp_path / "bytecode", 3)) <= 3.0

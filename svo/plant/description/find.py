@@ -44,7 +44,7 @@ def find_plant(name: str | Path, folder: str | Path = "", *, architecture: str |
 def _found(name: str, folder: Path) -> MonitoredPlant:
     if name.endswith(SUFFIX):
         return read_description(folder / name)
-    if name not in registered_plants() and (folder / name).is_file():
+    if (folder / name).is_file() and name not in registered_plants():
         raise ValueError(f"{name} is a file, and no plant is registered by that name; a description ends in {SUFFIX}")
     return load_plant(name)
 

@@ -1,11 +1,14 @@
 """Level trim, and the simulator's linearisation against the published derivatives."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
+from scipy.optimize import root
 
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.simulator import Surrogate
-from aircraft.eclipse.trim import gust_directions, level_trim, linearise, output_matrix
+from aircraft.eclipse.trim import Trim, gust_directions, level_trim, linearise, output_matrix
 
 TABLE = [  # V m/s, alpha = theta deg, eta deg, tau
     (25, 12.14, 21.2, 0.1675),
@@ -31,6 +34,35 @@ def test_nothing_moves_at_trim(V):
     np.testing.assert_allclose(trim.y, [np.hypot(*trim.x[:2]), np.arctan2(trim.x[1], trim.x[0]), trim.x[2], 0])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_trims_of_other_surrogates_are_the_roots_that_scipy_finds(seed):
+    rng = np.random.default_rng(seed)
+    surrogate = Surrogate(*(np.array(astuple(Surrogate())) * [*rng.uniform(0.7, 1.3, 11), 1.0]))
+    speeds = rng.uniform(25.0, 55.0, 20)
+    trims = level_trim(surrogate, speeds)
+    for V, *found in zip(speeds, trims.alpha, trims.elevator_deg, trims.thrust, strict=True):
+
+        def moving(unknowns, V=V):
+            trim = Trim(V, *unknowns)
+            return surrogate.derivative(trim.x, trim.u)[[0, 1, 3]]
+
+        np.testing.assert_allclose(root(moving, np.array(found) * 1.05, tol=1e-13).x, found, rtol=1e-12)
+
+
+def test_many_trims_are_each_the_one_at_its_airspeed():
+    speeds = np.linspace(25.0, 55.0, 6).reshape(2, 3)
+    many = level_trim(Surrogate(), speeds)
+    assert many.x.shape == many.y.shape == (2, 3, 4)
+    (A, B), C = linearise(Surrogate(), many), output_matrix(many)
+    for place in np.ndindex(2, 3):
+        one = level_trim(Surrogate(), speeds[place])
+        np.testing.assert_array_max_ulp(many.x[place], one.x, 4)
+        np.testing.assert_array_max_ulp(many.u[place], one.u, 4)
+        np.testing.assert_allclose(A[place], linearise(Surrogate(), one)[0], atol=1e-9)
+        np.testing.assert_allclose(B[place], linearise(Surrogate(), one)[1], atol=1e-9)
+        np.testing.assert_allclose(C[place], output_matrix(one), atol=1e-15)
+
+
 def test_a_moving_trim_shifts_the_state_as_much_as_the_airspeed():
     ahead, behind = level_trim(Surrogate(), 37.5), level_trim(Surrogate(), 36.5)
     assert (ahead.x - behind.x)[0] == pytest.approx(1.01, abs=0.005)
@@ -38,13 +70,16 @@ def test_a_moving_trim_shifts_the_state_as_much_as_the_airspeed():
 
 @pytest.mark.parametrize("airspeed", [24.9, 55.1, np.nan])
 def test_no_trim_outside_the_range_of_the_derivatives(airspeed):
-    with pytest.raises(ValueError, match="airspeed"):
+    with pytest.raises(ValueError, match=f"airspeed is {airspeed} m/s"):
         level_trim(Surrogate(), airspeed)
+    with pytest.raises(ValueError, match=f"airspeed is {airspeed} m/s"):
+        level_trim(Surrogate(), [37.0, airspeed])
 
 
-def test_surrogate_that_cannot_fly_level_is_named():
-    with pytest.raises(ValueError, match="surrogate"):
-        level_trim(Surrogate(CLa=np.nan), 37.0)
+@pytest.mark.parametrize("coefficients", [{"CLa": np.nan}, {"CLa": 0.0}, {"CLa": np.inf}, {"Cme": 0.0, "CLe": 0.0}])
+def test_surrogate_that_cannot_fly_level_is_named(coefficients):
+    with pytest.raises(ValueError, match=r"surrogate Surrogate.* has no level trim at 37.0 m/s"):
+        level_trim(Surrogate(**coefficients, CDe=0.0), 37.0)
 
 
 def test_linearisation_reproduces_the_published_derivatives_within_5_percent_rms():
