@@ -68,5 +68,6 @@ def detect(
     thresholds = plant.detect_thresholds(log) if isinstance(plant, DetectsThresholds) else None
     bank = plant.bank(noise)
     record = bank.run(scheduled(plant.scheduler(), log), progress=progress)
+    record = replace(record, labels=record.labels.in_columns(plant.columns))
     source = {**source_of_bank(plant), "noise": noise, **({} if log.source is None else {"log": log.source})}
     return Detection(plant, noise, log, record, alarms_of(record, log, source, bank.observers), thresholds)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.signatures import options_by_name
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
 from svo.interval.on_log import ThresholdDetection
 from svo.isolation import Alarm, BankRecord, Verdict, write_alarms
@@ -19,6 +20,10 @@ from svo.plant import MonitoredPlant
 from svo.plant.description import check_kept_description, keep_description
 from svo.store import write_text, write_whole
 from svo.terminal import line
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,6 +80,23 @@ class Detection:
         """Models that were falsified, began again (`recovery` of the bank) and explain the data to the end."""
         falsified = {alarm.observer for alarm in self.alarms}
         return tuple(name for name in self.alive if name in falsified)
+
+    @options_by_name
+    def plot(self, ax: Axes | None = None, *, channels: Sequence[str] | None = None) -> list[Artist]:
+        """Draw what the bank concluded and which models were alive, above their bounds of each state and the readings.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Drawn in its place; a new figure if absent.
+        channels : sequence of str, optional
+            Names of the columns to draw, of states and outputs; all by default.
+
+        Returns
+        -------
+        list of Artist
+        """
+        return self.record.plot(ax, channels=channels)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the certificates, for JSON; ``changes`` lists the verdict whenever it changed."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import replace
 from time import perf_counter
 from types import MappingProxyType
@@ -19,9 +20,10 @@ from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import BankState, Sample, restored, saved
 from svo.isolation.front import Front
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
-from svo.isolation.record import BankRecord, Recorder, Verdict
+from svo.isolation.record import BankRecord, Recorder, Replay, Verdict
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
+from svo.models import Labels
 from svo.observers.base import Observer, Step
 
 
@@ -249,12 +251,40 @@ class Bank(ABC):
         """
         expect_log(log)
         self._check_log(log)
-        recorder = Recorder(self.names, len(log))
+        recorder = Recorder(self.names, log, Labels.of(self.observers[NOMINAL].model), Replay(self._boxes_of(log)))
         for verdict, samples in self._follow(log):
             recorder.add(verdict, samples)
             if progress is not None:
                 progress(verdict.sample + 1, len(log))
         return recorder.record()
+
+    def _boxes_of(self, log: Log) -> Callable[[], dict[str, tuple[Array, Array]]]:
+        """What computes the boxes of a run from the present sample on, after it too."""
+        models = {id(o.model): o.model for o in self.observers.values()}  # values, as large as all the rest
+        try:
+            again = deepcopy(self, dict(models))
+        except Exception as error:
+            why = f"the bank cannot be copied ({type(error).__name__}: {error}), so its boxes cannot be computed again"
+
+            def refuse() -> dict[str, tuple[Array, Array]]:
+                raise ValueError(why)
+
+            return refuse
+        return lambda: again._boxes(log)
+
+    def _boxes(self, log: Log) -> dict[str, tuple[Array, Array]]:
+        """Bounds of the state over a log by each observer, (K, n) each; NaN where it has none."""
+        boxes = {name: np.full((len(log), 2, o.model.n_states), np.nan) for name, o in self.observers.items()}
+        if self._may_start_again:
+            for verdict in drive(self, log):
+                for name, step in verdict.steps.items():
+                    boxes[name][verdict.sample] = step.box
+        else:
+            for name, observer in self._running.items():
+                for _, step in observer.follow(log, boxes[name]):
+                    if step.verdict == "falsified":
+                        break
+        return {name: (box[:, 0], box[:, 1]) for name, box in boxes.items()}
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "observers": dict(self.observers)}

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from svo.isolation.logic import GLOBAL, StateName
+from polytopes.signatures import options_by_name
+from svo.checks import Array, optional_import
+from svo.isolation.logic import GLOBAL, NOMINAL, StateName
+from svo.logs.log import Log
+from svo.models import Labels
 from svo.observers.base import Certificate, Step
+from svo.observers.record import panels_of, runs
+from svo.pictures.style import INK, colours, in_seconds
+from svo.pictures.timeline import Lane, Span, Timeline
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+_STATES = {"nominal": "#8A929B", "detected": "#E69F00", "isolated": "#D55E00", "unexplained": INK}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +62,7 @@ class Verdict:
         return sum(step.stopped for step in self.steps.values())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class BankRecord:
     """A run of a bank over a log of K samples; columns in the order of ``names``.
 
@@ -75,6 +90,11 @@ class BankRecord:
         The fault that was isolated then.
     verdict : Verdict
         The bank's conclusion at the last sample, without steps.
+    log : Log
+    labels : Labels
+        Names of states and outputs.
+    replay : Replay
+        What computes `boxes`.
     global_seconds : (K,) array or None
         Wall time of the global observer's step, NaN where it was not stepped; None if the bank has none.
     """
@@ -91,14 +111,114 @@ class BankRecord:
     isolated_at: int | None
     fault: str | None
     verdict: Verdict
+    log: Log
+    labels: Labels
+    replay: Replay
     global_seconds: NDArray[np.float64] | None = None
+
+    @property
+    def time(self) -> Array:
+        """The log's own times (K,) [s]."""
+        return self.log.time
+
+    @property
+    def falsified_at(self) -> int | None:
+        """Sample at which the nominal model was declared falsified; None if it never was."""
+        return self.died_at[NOMINAL]
+
+    @property
+    def boxes(self) -> Mapping[str, tuple[Array, Array]]:
+        """Bounds (lower, upper), each (K, n), of the state by each model; "global" is there if the bank has one.
+
+        Infinite while a set is outgrown, NaN where a model was falsified or not running. They are computed when they
+        are first asked for, by running the bank over the log again.
+
+        Raises
+        ------
+        ValueError
+            If the bank could not be copied before the run, or the record was pickled before the boxes were asked for.
+        """
+        return self.replay.boxes
+
+    @options_by_name
+    def plot(self, ax: Axes | None = None, *, channels: Sequence[str] | None = None) -> list[Artist]:
+        """Draw what the bank concluded and which models were alive, above their bounds of each state and the readings.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Drawn in its place; a new figure if absent.
+        channels : sequence of str, optional
+            Names of the states and outputs to draw; all by default.
+
+        Returns
+        -------
+        list of Artist
+        """
+        tone = colours(self.names)
+        bounds = {tone[name]: self.boxes[name] for name in self.names}
+        panels = panels_of(self.log, self.labels, bounds, channels)
+        return Timeline(self.time, list(self._lanes(tone)), panels, self._marks()).draw(ax)
+
+    def to_dataframe(self) -> Any:
+        """A `pandas.DataFrame`, a row a sample: time, state of the bank, readings; of each model life and bounds."""
+        cells: dict[str, Any] = {"time_s": self.time, "state": list(self.states)}
+        cells |= dict(zip(self.labels.outputs, self.log.y.T, strict=True))
+        for i, name in enumerate(self.names):
+            cells[f"{name}_alive"] = self.alive[:, i]
+            lower, upper = self.boxes[name]
+            for state, label in enumerate(self.labels.states):
+                cells |= {f"{name}_{label}_lower": lower[:, state], f"{name}_{label}_upper": upper[:, state]}
+        return optional_import("pandas", "study", "data frames").DataFrame(cells)
+
+    def __repr__(self) -> str:
+        alive = ", ".join(self.verdict.alive)
+        found = "; ".join(self._marks().values()) or "no fault"
+        return f"<BankRecord of {len(self.states)} samples: {found}; alive: {alive:.120}>"
+
+    def _marks(self) -> dict[int, str]:
+        marks: dict[int, list[str]] = {}
+        for what, at in (("detected", self.detected_at), (f"isolated: {self.fault}", self.isolated_at)):
+            if at is not None:
+                marks.setdefault(at, []).append(what)
+        return {
+            at: f"{', '.join(what):.80} at {in_seconds(self.time[at], self.labels.Ts)}" for at, what in marks.items()
+        }
+
+    def _lanes(self, tone: Mapping[str, str]) -> Iterator[Lane]:
+        yield Lane("bank", INK, tuple(Span(a, b, _STATES[state], state) for state, a, b in runs(self.states)))
+        for i, name in enumerate(self.names):
+            answers = list(zip(self.alive[:, i].tolist(), self.undecided[:, i].tolist(), strict=True))
+            spans = [Span(a, b, tone[name], open=open) for (alive, open), a, b in runs(answers) if alive]
+            falls = np.flatnonzero(self.alive[:-1, i] & ~self.alive[1:, i]) + 1
+            first = [] if self.alive[0, i] else [0]
+            yield Lane(name, tone[name], tuple(spans), (*first, *falls.tolist()))
+
+
+class Replay:
+    """Boxes of a run, by running a copy of its bank again when they are asked for."""
+
+    def __init__(self, boxes: Callable[[], Mapping[str, tuple[Array, Array]]]) -> None:
+        self._compute: Callable[[], Mapping[str, tuple[Array, Array]]] | None = boxes
+
+    @cached_property
+    def boxes(self) -> Mapping[str, tuple[Array, Array]]:
+        """By the name of each observer."""
+        if self._compute is None:
+            raise ValueError("the boxes were not asked for before the record was pickled; ask for record.boxes first")
+        return self._compute()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # what would run again holds models, whose functions cannot always be pickled
+        return {**self.__dict__, "_compute": None}
 
 
 class Recorder:
     """Collects the verdicts of a run without keeping their steps."""
 
-    def __init__(self, names: tuple[str, ...], samples: int) -> None:
-        self._names = names
+    def __init__(self, names: tuple[str, ...], log: Log, labels: Labels, replay: Replay) -> None:
+        samples = len(log)
+        self._names, self._log, self._labels, self._replay = names, log, labels, replay
         self._states: list[StateName] = []
         self._alive = np.zeros((samples, len(names)), dtype=bool)
         self._seconds = np.full((samples, len(names)), np.nan)
@@ -156,5 +276,8 @@ class Recorder:
             isolated_at=self._isolated_at,
             fault=self._fault,
             verdict=replace(self._verdict, steps={}),
+            log=self._log,
+            labels=self._labels,
+            replay=self._replay,
             global_seconds=self._global_seconds,
         )

@@ -14,6 +14,17 @@ class Column:
     name: str
     unit: str
 
+    @property
+    def label(self) -> str:
+        """Name and unit for people; a unit that the name ends with is not said twice."""
+        name = self.name.removesuffix("_" + self.unit.replace("/", "_")).replace("_", " ")
+        return f"{name} [{self.unit}]" if self.unit else name
+
+    @property
+    def bounded(self) -> str:
+        """Label of a state where it is bounds that are shown: a column of true states may say "true" in its name."""
+        return Column(self.name.removeprefix("true_"), self.unit).label
+
 
 @options_by_name
 @dataclass(frozen=True)

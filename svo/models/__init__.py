@@ -2,6 +2,7 @@
 
 from svo.models.digest import ModelSample, model_digest
 from svo.models.discretisation import zero_order_hold
+from svo.models.labels import Labels
 from svo.models.model import Schedulable, UncertainModel, expect_model
 from svo.models.normal_form import Exponents, NormalForm, power, set_in
 from svo.models.schedule_table import ScheduleTable
@@ -10,6 +11,7 @@ from svo.models.uncertainty import Uncertainty
 
 __all__ = [
     "Exponents",
+    "Labels",
     "ModelSample",
     "NormalForm",
     "Schedulable",

@@ -116,18 +116,3 @@ class Seen(NamedTuple):
 
     samples: int
     step: Step
-
-
-@dataclass(frozen=True, eq=False)
-class Record:
-    """A log seen by one observer: verdicts, boxes (K, n) and seconds (K,), and the certificate if it was falsified.
-
-    ``stopped`` counts the programs that ended at a limit, as `Observer.stopped`, those of boxes among them.
-    """
-
-    verdicts: tuple[VerdictName, ...]
-    lower: Array
-    upper: Array
-    seconds: Array
-    certificate: Certificate | None
-    stopped: int = 0

@@ -20,8 +20,8 @@ from polytopes.rounding import check_rounding
 from svo.checks import Array, is_count
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
-from svo.models import UncertainModel, expect_model
-from svo.observers.answers import Record, Seen, Step, VerdictName
+from svo.models import Labels, UncertainModel, expect_model
+from svo.observers.answers import Seen, Step, VerdictName
 from svo.observers.certificate import Certificate
 from svo.observers.data import (
     check_may_start_by_step,
@@ -31,6 +31,7 @@ from svo.observers.data import (
     seconds_allowed,
 )
 from svo.observers.first_states import first_box
+from svo.observers.record import Record
 from svo.observers.saved_state import State, check_model, check_unchanged, last_schedule, sealed
 
 __all__ = ["Certificate", "Observer", "Record", "Seen", "Step", "VerdictName"]
@@ -212,8 +213,9 @@ class Observer(ABC):
         for samples, step in self.follow(log, boxes):
             verdicts += [step.verdict] * samples
             seconds += [step.seconds] * samples
-        stopped = self.stopped - before
-        return Record(tuple(verdicts), boxes[:, 0], boxes[:, 1], np.array(seconds), step.certificate, stopped)
+        bounds, stopped = (boxes[:, 0], boxes[:, 1]), self.stopped - before
+        labels = Labels.of(self.model)
+        return Record(tuple(verdicts), *bounds, np.array(seconds), step.certificate, log, labels, stopped)
 
     def follow(self, log: Log, boxes: Array | None = None) -> Iterator[Seen]:
         """The samples of a log as they are seen: one after the other, or many consistent ones at once.

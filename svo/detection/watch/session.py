@@ -19,6 +19,7 @@ from svo.detection.watch.rows import RowReader
 from svo.detection.watch.timeline import Event, Row, Timeline
 from svo.isolation import GLOBAL, Alarm, Verdict
 from svo.logs.drive import advance
+from svo.models import Labels
 from svo.plant import MonitoredPlant, resume_schedule, saved_schedule, schedule_of
 from svo.plant.description import description_digest
 
@@ -110,7 +111,7 @@ class Session:
         self._seconds = 0.0
         self._start()
         self.names = self._bank.names
-        self.states = _state_names(plant, self._bank.observers["nominal"].model.n_states)
+        self.states = Labels.of(self._bank.observers["nominal"].model).in_columns(plant.columns).state_titles
 
     def _start(self) -> None:
         """The first sample comes next."""
@@ -306,11 +307,3 @@ def identity_of(plant: MonitoredPlant, noise: str, log: str) -> dict[str, str]:
 
 def _part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
     return {name.removeprefix(prefix): value for name, value in arrays.items() if name.startswith(prefix)}
-
-
-def _state_names(plant: MonitoredPlant, n: int) -> tuple[str, ...]:
-    """As the plant's columns call its states, if there is one each."""
-    columns = plant.columns.states
-    if len(columns) != n:
-        return tuple(f"x{i + 1}" for i in range(n))
-    return tuple(f"{c.name} [{c.unit}]" for c in columns)

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from svo.pictures.style import STYLE, colours, in_seconds, new_figure
 from svo.plant import HEALTHY, Plant, fault_start
 from svo.store import file_name
-from svo.studies.drawing import STYLE, new_figure, save_picture
+from svo.studies.drawing import save_picture
 from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.summary import ConditionSummary
@@ -133,7 +134,7 @@ def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
         for ax, snapshot in zip(row, snapshots, strict=False):
             plots.plot_sets(exemplar, snapshot, dims, plant.columns.states, ax)
             after = exemplar.time[snapshot.sample] - _start(plant, exemplar)
-            when = plots.in_seconds(after, plant.Ts, "+")
+            when = in_seconds(after, plant.Ts, "+")
             ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {when}\n{snapshot.event}", fontsize=9.5)
             ax.xaxis.set_major_locator(MaxNLocator(4))
             ax.yaxis.set_major_locator(MaxNLocator(5))
@@ -165,7 +166,7 @@ def _model_legend(figure: Figure, names: Sequence[str]) -> None:
 
     handles: list[Patch | Line2D] = [
         Patch(label=f"{name} model", edgecolor=colour, facecolor=(colour, 2.5 * plots.FILL), linewidth=1.5)
-        for name, colour in plots.colours(names).items()
+        for name, colour in colours(names).items()
     ]
     handles.append(Line2D([], [], color="#111111", marker="x", markeredgewidth=1.8, linewidth=1.1, label="true state"))
     figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from svo.pictures.style import colours
 from svo.plant import HEALTHY, Plant, fault_start
 from svo.studies.isolation.exemplar import Exemplar
-from svo.studies.isolation.plots import colours, column_label, separating_states, time_window
+from svo.studies.isolation.plots import separating_states, time_window
 from svo.studies.isolation.run import RunRow
 from svo.studies.page import render
 
@@ -80,7 +81,7 @@ def _flight(plant: Plant, exemplar: Exemplar) -> dict[str, Any]:
     bank = f", Architecture {exemplar.architecture}" if exemplar.architecture else ""
     return {
         "title": f"{exemplar.fault}, {exemplar.profile}, {exemplar.noise} noise" + bank,
-        "axes": [column_label(plant.columns.states[i]) for i in states],
+        "axes": [plant.columns.states[i].bounded for i in states],
         "time": _numbers(after[kept]),
         "true": _numbers(exemplar.x[kept][:, states]),
         "models": models,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from svo.logs.names import Column
+from svo.pictures.style import COLOURS, axes_or_new, colours, in_seconds
 from svo.plant import HEALTHY, Reference
 from svo.studies.isolation.exemplar import Exemplar, Snapshot
 from svo.studies.isolation.summary import ConditionSummary
@@ -18,15 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-# Okabe and Ito's colours, told apart by colour-blind readers; the first is the nominal model's.
-COLOURS = ("#5B6470", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 FILL = 0.14  # opacity of a set, so that those behind it are seen
 DETECT, ISOLATE, PAPER = "#56B4E9", "#0072B2", "#D55E00"
-
-
-def colours(names: Sequence[str]) -> dict[str, str]:
-    """One colour for each observer, the nominal one first."""
-    return {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(names)}
 
 
 def plot_delays(
@@ -40,7 +34,7 @@ def plot_delays(
     Where a delay was not reached in every run, the count stands above the bar. ``reference`` figures are drawn as
     diamonds, or as triangles that point down where the paper gives an upper bound.
     """
-    ax = _axes(ax)
+    ax = axes_or_new(ax, 6.4, 4.8)
     faulty = [s for s in summaries if s.fault != HEALTHY]
     artists: list[Artist] = []
     for offset, name, colour, label in ((-0.19, "detect", DETECT, "detected"), (0.19, "isolate", ISOLATE, "isolated")):
@@ -61,7 +55,7 @@ def plot_architectures(
     ax: Axes | None = None,
 ) -> list[Artist]:
     """Bars of mean times to "detect" or "isolate", the architectures side by side; otherwise as `plot_delays`."""
-    ax = _axes(ax)
+    ax = axes_or_new(ax, 6.4, 4.8)
     faulty = [s for s in summaries if s.fault != HEALTHY]
     conditions = list(dict.fromkeys((s.fault, s.profile) for s in faulty))
     banks = list(dict.fromkeys(s.architecture for s in faulty))
@@ -108,7 +102,7 @@ def plot_alive(exemplar: Exemplar, fault_time: float, Ts: float, ax: Axes | None
 
     The time beside a bar is the delay of the falsification (the first faulty sample counts as one sampling time).
     """
-    ax = _axes(ax)
+    ax = axes_or_new(ax, 6.4, 4.8)
     tone = colours(exemplar.names)
     start, end = time_window(exemplar, fault_time, Ts)
     artists: list[Artist] = []
@@ -131,7 +125,7 @@ def plot_sets(
     exemplar: Exemplar, snapshot: Snapshot, dims: Sequence[int], states: Sequence[Column], ax: Axes | None = None
 ) -> list[Artist]:
     """Projections of the sets of the models alive at one sample, with the true state as a cross."""
-    ax = _axes(ax)
+    ax = axes_or_new(ax, 6.4, 4.8)
     tone = colours(exemplar.names)
     artists: list[Artist] = []
     for name, polytope in snapshot.sets.items():
@@ -143,7 +137,7 @@ def plot_sets(
     true = exemplar.x[snapshot.sample, list(dims)]
     artists += ax.plot(*true, "x", color="#111111", markersize=7, markeredgewidth=1.8, zorder=5)
     ax.margins(0.08)
-    ax.set(xlabel=column_label(states[dims[0]]), ylabel=column_label(states[dims[1]]))
+    ax.set(xlabel=states[dims[0]].bounded, ylabel=states[dims[1]].bounded)
     return artists
 
 
@@ -151,7 +145,7 @@ def plot_bounds(
     exemplar: Exemplar, state: int, states: Sequence[Column], fault_time: float, ax: Axes | None = None
 ) -> list[Artist]:
     """Bounds of one state over time, by the nominal model and by that of the true fault, with the true value."""
-    ax = _axes(ax)
+    ax = axes_or_new(ax, 6.4, 4.8)
     tone, time = colours(exemplar.names), exemplar.time - fault_time
     artists: list[Artist] = []
     for name in (exemplar.names[0], exemplar.fault):
@@ -162,7 +156,7 @@ def plot_bounds(
         )
     artists += ax.plot(time, exemplar.x[:, state], color="#111111", linewidth=1.1, label="true state")
     artists.append(_fault_line(ax))
-    ax.set(xlabel="time after the fault [s]", ylabel=column_label(states[state]))
+    ax.set(xlabel="time after the fault [s]", ylabel=states[state].bounded)
     return artists
 
 
@@ -198,20 +192,6 @@ def time_window(exemplar: Exemplar, fault_time: float, Ts: float) -> tuple[float
     if last > 0:
         end = min(end, max(1.5 * last, 10 * Ts))
     return max(float(exemplar.time[0]) - fault_time, -0.25 * end), end
-
-
-def in_seconds(time: float, Ts: float, sign: str = "-") -> str:
-    """A multiple of the sampling time Ts [s] in the digits that it needs; ``sign`` as in a format."""
-    digits = next((d for d in range(9) if abs(round(Ts, d) - Ts) <= 1e-6 * Ts), 9)
-    return f"{time:{sign}.{digits}f} s"
-
-
-def _axes(ax: Axes | None) -> Axes:
-    if ax is not None:
-        return ax
-    import matplotlib.pyplot as plt
-
-    return plt.subplots()[1]
 
 
 def _whisker(ax: Axes, x: float, delays: Delays, floor: float) -> list[Artist]:
@@ -252,9 +232,3 @@ def _circles(ax: Axes) -> list[Artist]:
             centre = (box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2
             artists += ax.plot(*centre, "o", color=patch.get_edgecolor(), markersize=10, fillstyle="none", zorder=4)
     return artists
-
-
-def column_label(column: Column) -> str:
-    """Name and unit; a unit that the column's name ends with is not said twice."""
-    name = column.name.removesuffix("_" + column.unit.replace("/", "_"))
-    return f"{name.replace('_', ' ')} [{column.unit}]"

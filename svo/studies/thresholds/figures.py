@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from svo.pictures.style import STYLE, new_figure
 from svo.plant import HEALTHY
 from svo.store import file_name
-from svo.studies.drawing import STYLE, new_figure, save_picture
+from svo.studies.drawing import save_picture
 from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary, learning_records

@@ -9,9 +9,9 @@ import numpy as np
 
 from svo.indices import judge_alarm
 from svo.interval.detector import IntervalRecord
+from svo.pictures.style import STYLE, in_seconds, new_figure
 from svo.plant import HEALTHY, fault_start, first_faulty_sample
-from svo.studies.drawing import STYLE, new_figure, save_picture
-from svo.studies.isolation.plots import in_seconds
+from svo.studies.drawing import save_picture
 from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 

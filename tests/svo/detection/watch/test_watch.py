@@ -319,7 +319,7 @@ def test_in_a_terminal_there_is_a_table_with_models_units_and_alarms() -> None:
     watch(lines, session, view)
     shown = screen.getvalue()
     for words in (
-        "true_speed [m/s]",
+        "speed [m/s]",
         "falsified at 5 s",
         "isolated: sensor",
         "ALARM 5 s: motor",
@@ -335,7 +335,7 @@ def test_a_narrow_terminal_shows_the_bounds_below_the_models() -> None:
     view = LiveView(Console(file=screen, force_terminal=True, width=50, color_system=None), session)
     view.close(session.status(), "End")
     shown = screen.getvalue()
-    for words in ("falsified at 5 s", "bounds by sensor", "true_speed [m/s]", "[-0.9714, 1.327]"):
+    for words in ("falsified at 5 s", "bounds by sensor", "speed [m/s]", "[-0.9714, 1.327]"):
         assert words in shown
     assert "…" not in shown
 

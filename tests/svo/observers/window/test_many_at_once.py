@@ -14,9 +14,10 @@ import pytest
 from aircraft.eclipse.plant import eclipse
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver
-from svo.isolation.record import BankRecord, Recorder
+from svo.isolation.record import BankRecord, Recorder, Replay
 from svo.logs.drive import drive
 from svo.logs.log import Log
+from svo.models import Labels
 from tests.svo.observers.random_plants import random_plant
 
 
@@ -78,7 +79,7 @@ def test_a_run_leaves_the_observer_as_steps_do(seed: int) -> None:
 
 
 def by_steps(bank: Any, log: Log) -> BankRecord:
-    recorder = Recorder(bank.names, len(log))
+    recorder = Recorder(bank.names, log, Labels.of(bank.observers["nominal"].model), Replay(dict))
     for verdict in drive(bank, log):
         recorder.add(verdict)
     return recorder.record()

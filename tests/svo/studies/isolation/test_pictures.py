@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from polytopes import HPolytope
+from svo.pictures.style import in_seconds
 from svo.plant import Column, Plant, load_plant
 from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar, Snapshot
@@ -191,8 +192,8 @@ def test_fault_free_studies_have_no_pictures(tank: Plant, summaries: list[Condit
 )
 def test_times_have_the_digits_of_the_sampling_time(time: float, Ts: float, text: str) -> None:
     """0.00 s for a plant with 0.2 ms, 21.00 s with 1 s."""
-    assert plots.in_seconds(time, Ts) == text
-    assert plots.in_seconds(time, Ts, "+") == f"+{text}"
+    assert in_seconds(time, Ts) == text
+    assert in_seconds(time, Ts, "+") == f"+{text}"
 
 
 def test_pictures_write_times_in_the_digits_of_the_sampling_time() -> None:
