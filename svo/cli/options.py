@@ -33,7 +33,7 @@ DescribedName = Annotated[
     str, typer.Argument(metavar="PLANT", help="A registered plant, or a TOML file that describes one (my.toml).")
 ]
 LogFile = Annotated[
-    Path, typer.Argument(metavar="LOG", help="CSV, Parquet or MAT file with the plant's columns (`svo plants --json`).")
+    Path, typer.Argument(metavar="LOG", help="CSV, Parquet or MAT file with the plant's columns, or as its [log] says.")
 ]
 PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered plant; `svo plants` lists them.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]

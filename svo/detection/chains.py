@@ -15,6 +15,7 @@ from svo.models import ModelSample
 from svo.observers.window.chain import promises_of, prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
 from svo.plant import MonitoredPlant, in_architecture
+from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
 
 
@@ -41,7 +42,7 @@ class PlantModels:
         """A fresh bank of the architecture and noise set that an alarm names."""
         architecture = alarm.source.get("architecture")
         chosen = in_architecture(self._plant, None if architecture is None else str(architecture))
-        return chosen.bank(str(alarm.source.get("noise")))
+        return on_log(chosen, self.log).bank(str(alarm.source.get("noise")))
 
     def difference(self, alarm: Alarm) -> str | None:
         """How an alarm's matrices, bounds and digest are not those of the plant's observer that it names, or None."""

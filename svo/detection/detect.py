@@ -12,6 +12,7 @@ from svo.detection.thresholds import DetectsThresholds
 from svo.logs.columns import check_times
 from svo.logs.log import Log, expect_log
 from svo.plant import MonitoredPlant, chosen_noise
+from svo.plant.dialects import on_log
 from svo.plant.protocol import expect_plant
 from svo.plant.scheduling import scheduled
 
@@ -66,7 +67,7 @@ def detect(
     noise = chosen_noise(plant, noise)
     # First, for it takes no time, and what it may refuse would cost the bank's answer.
     thresholds = plant.detect_thresholds(log) if isinstance(plant, DetectsThresholds) else None
-    bank = plant.bank(noise)
+    bank = on_log(plant, log).bank(noise)
     record = bank.run(scheduled(plant.scheduler(), log), progress=progress)
     record = replace(record, labels=record.labels.in_columns(plant.columns))
     source = {**source_of_bank(plant), "noise": noise, **({} if log.source is None else {"log": log.source})}

@@ -15,6 +15,7 @@ from svo.analysis.calibration import Calibration, calibrate
 from svo.detection.detect import check_log
 from svo.logs.log import Log
 from svo.plant import MonitoredPlant
+from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
 
 
@@ -79,7 +80,7 @@ def calibrate_log(plant: MonitoredPlant, log: Log, noise: str) -> LogCalibration
     Raises as `svo.detection.detect.detect` and `svo.analysis.calibration.calibrate` do.
     """
     check_log(plant, log)
-    nominal, log = plant.bank(noise).observers["nominal"], scheduled(plant.scheduler(), log)
+    nominal, log = on_log(plant, log).bank(noise).observers["nominal"], scheduled(plant.scheduler(), log)
     # Nothing measured yet, so this is the set that the observer starts from.
     start = nominal.update(np.full(log.y.shape[1], np.nan), u=log.u[0], schedule=log.schedule_at(0)).box
     result = calibrate(nominal.model, log, HPolytope.box(*start))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from polytopes.signatures import options_by_name
-from svo.checks import Array, expect_kind, expect_shape, readings, real_array
+from svo.checks import Array, expect_kind, expect_shape, readings, real_array, sizes
 from svo.logs import frames
 from svo.logs.columns import checked_parts
 from svo.logs.names import Columns
@@ -34,6 +34,9 @@ class Log:
         Scheduling value at each sample; None for plants without one.
     source : str, optional
         Where it comes from, such as the name of its file: stored with the alarms that it raises.
+    widening : (ny,) array, optional
+        By what the bound of each sensor's noise is wider on this log than in the model, half-widths in its unit: the
+        price of readings that were moved in time, and of numbers that were rounded. `svo.detect` adds it.
     """
 
     time: Array
@@ -43,6 +46,7 @@ class Log:
     x: Array | None = None
     schedule: Array | None = None
     source: str | None = None
+    widening: Array | None = None
 
     def __post_init__(self) -> None:
         time = real_array("time", self.time, ("K",), finite=False)
@@ -59,6 +63,8 @@ class Log:
             fits = array.shape[:1] == time.shape and (name == "schedule" or array.ndim == 2)
             expect_shape(fits, name, array, f"({time.size}, channels), one row a sample of time")
             object.__setattr__(self, name, array)
+        if self.widening is not None:
+            object.__setattr__(self, "widening", sizes("widening", self.widening, self.y.shape[1]))
 
     def __len__(self) -> int:
         return int(self.time.size)

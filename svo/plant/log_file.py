@@ -9,7 +9,9 @@ import numpy as np
 
 from svo.logs import file
 from svo.logs.columns import LogNote
+from svo.logs.dialect.read import noted, read_dialect
 from svo.logs.log import Log
+from svo.plant.dialects import dialect_of
 from svo.plant.protocol import MonitoredPlant, expect_plant
 
 
@@ -19,7 +21,8 @@ def read_log(path: str | Path, plant: MonitoredPlant) -> Log:
     Parameters
     ----------
     path : path of a .csv, .parquet or .mat file
-        With the plant's columns, under the rules of `svo.logs.columns`.
+        With the plant's columns, under the rules of `svo.logs.columns`; or whatever the `[log]` table of a described
+        plant says of it, then also a folder, or a text file of any suffix.
     plant : MonitoredPlant
         As `svo.find_plant` gives it: its columns and sampling time.
 
@@ -44,7 +47,7 @@ def read_log(path: str | Path, plant: MonitoredPlant) -> Log:
         If the file cannot be opened.
     """
     expect_plant(plant)
-    log = file.read_log(path, plant.columns, plant.Ts)
+    log = _read(path, plant)
     silent = [column.name for column, y in zip(plant.columns.outputs, log.y.T, strict=True) if np.isnan(y).all()]
     if len(silent) == len(plant.columns.outputs):
         raise ValueError(
@@ -55,3 +58,10 @@ def read_log(path: str | Path, plant: MonitoredPlant) -> Log:
         said = f"{path} has no measurement of {name!r}; nothing is concluded from that sensor"
         warnings.warn(said, LogNote, stacklevel=2)
     return log
+
+
+def _read(path: str | Path, plant: MonitoredPlant) -> Log:
+    dialect = dialect_of(plant)
+    if dialect is None:
+        return file.read_log(path, plant.columns, plant.Ts)
+    return noted(read_dialect(path, plant.columns, plant.Ts, dialect), path)

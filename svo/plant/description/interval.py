@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from svo.interval import GainBounds, IntervalDetector, IntervalPredictor, NoiseCharacterization
-from svo.logs.file import read_log
 from svo.logs.log import Log
 from svo.logs.names import Columns
 from svo.plant.description.table import Table
@@ -49,8 +48,8 @@ class IntervalSettings:
     records: tuple[Path, ...]
     learn_until_s: float | None
 
-    def detector(self, log: Log, columns: Columns, Ts: float) -> tuple[IntervalDetector, Log]:
-        """The detector with its learnt noise, and the part of the log that it is to judge.
+    def detector(self, log: Log, read: Callable[[Path], Log]) -> tuple[IntervalDetector, Log]:
+        """The detector with its learnt noise, and the part of the log that it is to judge; ``read`` reads the records.
 
         Raises
         ------
@@ -60,7 +59,7 @@ class IntervalSettings:
             If a record cannot be opened.
         """
         if self.learn_until_s is None:
-            learning, judged = [self._channel(read_log(path, columns, Ts)) for path in self.records], self._channel(log)
+            learning, judged = [self._channel(read(path)) for path in self.records], self._channel(log)
         else:
             begin = int(np.searchsorted(log.time, self.learn_until_s))
             if not 0 < begin < len(log):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
-from svo.checks import expect
+from svo.checks import Array, expect
 from svo.interval.on_log import ThresholdDetection, detect_thresholds
 from svo.isolation import ArchitectureI, ArchitectureII, Bank
+from svo.logs.dialect.rules import Dialect
 from svo.logs.log import Log
 from svo.logs.names import Column, Columns
 from svo.models import UncertainModel
@@ -21,10 +22,14 @@ from svo.observers.window.observer import WindowObserver
 from svo.plant import no_schedule
 from svo.plant.description.faults import FaultModel, faults_of
 from svo.plant.description.interval import IntervalSettings, interval_settings
+from svo.plant.description.log import dialect_of
 from svo.plant.description.model import box_of, model_file, model_of
 from svo.plant.description.table import Table, read_table
+from svo.plant.log_file import read_log
 
-_TOP = ("title", "Ts", "columns", "model", "initial", "observer", "faults", "global", "bank", "interval_detector")
+_TOP = (
+    "title", "Ts", "columns", "log", "model", "initial", "observer", "faults", "global", "bank", "interval_detector",
+)  # fmt: skip
 STATED = "stated"
 
 
@@ -61,6 +66,8 @@ class DescribedPlant:
         The files that describe the plant.
     interval : IntervalSettings or None
         An interval detector to run beside the bank.
+    dialect : Dialect or None
+        How logs are written, where they are not plain ones.
     """
 
     name: str
@@ -74,6 +81,7 @@ class DescribedPlant:
     bank_options: Mapping[str, int]
     files: tuple[Path, ...]
     interval: IntervalSettings | None = None
+    dialect: Dialect | None = None
     noise_sets: tuple[str, ...] = (STATED,)
 
     @property
@@ -101,11 +109,16 @@ class DescribedPlant:
         """A described model has no schedule."""
         return no_schedule
 
+    def widened(self, widening: Array) -> DescribedPlant:
+        """The plant with bounds of its sensors' noise that are wider by ``widening`` (ny,), healthy and faulty."""
+        faults = {name: replace(fault, model=_wider(fault.model, widening)) for name, fault in self.faults.items()}
+        return replace(self, model=_wider(self.model, widening), faults=faults)
+
     def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
         """What the interval detector says about a log; None if there is none in the file."""
         if self.interval is None:
             return None
-        return detect_thresholds(*self.interval.detector(log, self.columns, self.Ts))
+        return detect_thresholds(*self.interval.detector(log, lambda path: read_log(path, self)))
 
     def _observer(self, model: UncertainModel) -> WindowObserver:
         return WindowObserver(model, self.initial, horizon=self.observer.horizon, template=self.observer.template)
@@ -140,7 +153,12 @@ def read_description(path: str | Path) -> DescribedPlant:
         bank_options=_bank_options(top),
         files=_files(path, top.table("model")),
         interval=interval_settings(top, columns),
+        dialect=dialect_of(top, columns),
     )
+
+
+def _wider(model: UncertainModel, widening: Array) -> UncertainModel:
+    return model.replace(n=np.asarray(model.n, dtype=float) + widening)
 
 
 def _files(path: Path, model: Table) -> tuple[Path, ...]:

@@ -1,0 +1,225 @@
+"""Rows and named columns of a text file, every cell as the text that it is."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from svo.logs.dialect.rules import Dialect, Which
+from svo.logs.dialect.text import lines_of
+
+_SAMPLES = re.compile(r'"?((?:number of )?(?:samples|rows|records|points))\b"?[\s:;,=]+"?(\d{1,12})\b', re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The rows of a text file.
+
+    Attributes
+    ----------
+    source : str
+        The file, for messages.
+    names : tuple of str
+        Of the columns; "" where one has none.
+    rows : sequence of sequence of str
+        Cells, as many a row as there are names.
+    lines : sequence of int
+        The line of the file that each row begins in.
+    again : tuple of int
+        Lines in which the names stood again.
+    notes : tuple of str
+    """
+
+    source: str
+    names: tuple[str, ...]
+    rows: Sequence[Sequence[str]]
+    lines: Sequence[int]
+    again: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def place(self, row: int) -> str:
+        """Where a row stands, for messages."""
+        return f"line {self.lines[row]}"
+
+    def size(self, which: Which) -> int:
+        """Rows of a column."""
+        return len(self.rows)
+
+    def line(self, row: int) -> int:
+        """The line that a row begins in."""
+        return self.lines[row]
+
+    def column(self, which: Which) -> list[str]:
+        """The cells of a column.
+
+        Raises
+        ------
+        ValueError
+            If there is no such column, or more than one.
+        """
+        at = self.position(which)
+        return [row[at] for row in self.rows]
+
+    def label(self, which: Which) -> str:
+        """How messages call a column."""
+        return f"column {which!r}" if isinstance(which, str) else f"column {which} ({self.names[which - 1]!r})"
+
+    def position(self, which: Which) -> int:
+        """Where a column stands, from 0 on."""
+        if isinstance(which, int):
+            if not 1 <= which <= len(self.names):
+                raise ValueError(f"{self.source} has no column {which}; expected a number from 1 to {len(self.names)}")
+            return which - 1
+        found = [i for i, name in enumerate(self.names) if name == which.strip()]
+        if not found:
+            raise ValueError(f"{self.source} has no column {which!r}; {self._others(which)}")
+        if len(found) > 1:
+            where = " and ".join(str(i + 1) for i in found)
+            raise ValueError(f"{self.source}: {which!r} is the name of columns {where}; state the number instead")
+        return found[0]
+
+    def _others(self, which: str) -> str:
+        named = [name for name in self.names if name]
+        close = get_close_matches(which, named, n=1)
+        meant = f"; is {close[0]!r} meant?" if close else ""
+        return f"found {', '.join(map(repr, named)) or 'no names'}{meant}"
+
+
+def read_sheet(path: Path, dialect: Dialect) -> Sheet:
+    """Read a text file as a dialect states it.
+
+    Raises
+    ------
+    ValueError
+        Naming the file and the line.
+    OSError
+        If the file cannot be opened.
+    """
+    lines, whole = lines_of(path, dialect.encoding)
+    notes = []
+    if lines and not whole:
+        notes.append(_no_end(len(lines)))
+        lines = lines[:-1] if len(lines) > 1 else lines
+    feed = _Feed(lines, dialect)
+    rows = _rows(str(path), feed, dialect)
+    names = _names(str(path), lines, dialect, rows)
+    found, numbers, again = [], [], []
+    for line, row in rows:
+        cells = [cell.strip() for cell in row]
+        if not any(cells) or line < (dialect.first_row or 0):
+            continue
+        if _ends_cut(cells) == _ends_cut(names):
+            again.append(line)
+            continue
+        found.append(_fitted(str(path), line, cells, names))
+        numbers.append(line)
+    notes += _promised(lines, dialect, len(found))
+    if feed.skipped:
+        notes.append(f"{feed.skipped} lines are skipped, as [log] states")
+    if again:
+        notes.append(f"the names stand again in line{'s' * (len(again) > 1)} {', '.join(map(str, again[:5]))}")
+    return Sheet(str(path), names, found, numbers, tuple(again), tuple(notes))
+
+
+def _promised(lines: Sequence[str], dialect: Dialect, rows: int) -> list[str]:
+    """A note if the lines before the names say another number of rows than there are."""
+    for line in lines[: (dialect.header or 1) - 1]:
+        said = _SAMPLES.match(line)
+        if said and int(said[2]) != rows:
+            return [f"the preamble says {said[1]} {said[2]}, but there are {rows} rows; the rows count"]
+    return []
+
+
+def _no_end(line: int) -> str:
+    return (
+        f"the last line ({line}) has no end and was left out, since it may be cut; if it is whole, put a line break "
+        "behind it"
+    )
+
+
+def _names(
+    source: str, lines: Sequence[str], dialect: Dialect, rows: Iterator[tuple[int, list[str]]]
+) -> tuple[str, ...]:
+    if dialect.names:
+        return tuple(name.strip() for name in dialect.names)
+    if dialect.header is None:
+        first = next(rows, None)
+        if first is None:
+            raise ValueError(f"{source} is empty; expected a line with the names of the columns and one row a sample")
+        return tuple(cell.strip() for cell in first[1])
+    if len(lines) < dialect.header:
+        raise ValueError(
+            f"{source} ends at line {len(lines)}; expected the names of the columns in line {dialect.header}, as "
+            "header of [log] states"
+        )
+    alone = _Feed([lines[dialect.header - 1]], Dialect(separator=dialect.separator))
+    row = next(_rows(f"{source}, header", alone, dialect), None)
+    if row is None:
+        raise ValueError(f"{source}, line {dialect.header}: the line is blank; expected the names of the columns")
+    return tuple(cell.strip() for cell in row[1])
+
+
+class _Feed:
+    """Hands the lines of data to the reader of cells, and knows where the row that it makes begins."""
+
+    def __init__(self, lines: Sequence[str], dialect: Dialect) -> None:
+        self._lines = lines
+        self._skip = [re.compile(pattern) for pattern in dialect.skip]
+        self._first = dialect.first_row or (dialect.header or 0) + 1
+        if dialect.header is None and not dialect.names:
+            self._first = 1
+        self._blanks = dialect.separator == " "
+        self.begin: int | None = None
+        self.skipped = 0
+
+    def __iter__(self) -> Iterator[str]:
+        for number, line in enumerate(self._lines[self._first - 1 :], start=self._first):
+            if any(pattern.search(line) for pattern in self._skip):
+                self.skipped += 1
+                continue
+            if self.begin is None:
+                if not line.strip():
+                    continue
+                self.begin = number
+            yield " ".join(line.split()) if self._blanks else line
+
+
+def _rows(source: str, feed: _Feed, dialect: Dialect) -> Iterator[tuple[int, list[str]]]:
+    """Line and cells of each row that is not blank."""
+    options: dict[str, Any] = {"strict": True, "skipinitialspace": True, "delimiter": dialect.separator}
+    reader = csv.reader(iter(feed), **options)
+    while True:
+        feed.begin = None
+        try:
+            row = next(reader, None)
+        except csv.Error as error:
+            raise ValueError(
+                f"{source}, line {feed.begin}: the cells cannot be told apart ({error}); is the separator "
+                f"{dialect.separator!r}, and is every quote closed?"
+            ) from error
+        if row is None:
+            return
+        if row:
+            yield feed.begin or 0, row
+
+
+def _ends_cut(cells: Sequence[str]) -> list[str]:
+    """Without the empty cells at the end."""
+    last = max((i for i, cell in enumerate(cells) if cell), default=-1)
+    return list(cells[: last + 1])
+
+
+def _fitted(source: str, line: int, cells: list[str], names: Sequence[str]) -> list[str]:
+    """As many cells as there are names: a short row is padded, and what is too much must be empty."""
+    extra = [cell for cell in cells[len(names) :] if cell]
+    if extra:
+        raise ValueError(
+            f"{source}, line {line}: {len(cells)} cells ({extra[0]!r:.60} among them), but {len(names)} names of "
+            "columns; state skip in [log] if the line is no row, or another header or separator"
+        )
+    return cells[: len(names)] + [""] * (len(names) - len(cells))
