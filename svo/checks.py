@@ -39,6 +39,8 @@ __all__ = [
 Array = NDArray[np.float64]
 Item = TypeVar("Item")
 
+_FLOAT = np.dtype(np.float64)
+
 
 def expect(holds: object, name: str, value: Any, what: str) -> None:
     """Refuse the value of an argument unless something holds; ``what`` was expected instead."""
@@ -91,7 +93,7 @@ def readings(name: str, value: Any, *shapes: Shape, meaning: str = "") -> Array:
 
 def floats(name: str, value: Any, *, missing: bool = False) -> Array:
     """What comes at every sample, for a caller that checks shape and NaN: an array of floats goes through as it is."""
-    if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous:
+    if type(value) is np.ndarray and value.dtype == _FLOAT and value.flags.c_contiguous:
         return value
     if type(value) is list and all(type(v) is float for v in value):
         return np.array(value)

@@ -27,7 +27,7 @@ static void combine(const window *w, integer q, integer k, const double *values,
 }
 
 /* Multipliers and reduced costs of the basis; nonbasic variables go to the bound that they like. */
-static void price_out(const window *w, integer q, integer k)
+WIDE static void price_out(const window *w, integer q, integer k)
 {
     const integer Z = w->Z, *rows = w->rows + q * w->K, *cols = w->cols + q * w->K;
     integer *status = w->status + q * Z;
@@ -43,7 +43,7 @@ static void price_out(const window *w, integer q, integer k)
 }
 
 /* z and the row activities of the basis. */
-static void primal_point(const window *w, integer q, integer k)
+WIDE static void primal_point(const window *w, integer q, integer k)
 {
     const integer Z = w->Z, K = w->K, *rows = w->rows + q * K, *cols = w->cols + q * K, *status = w->status + q * Z;
     const double *inverse = w->inverse + q * K * K;
@@ -63,7 +63,7 @@ static void primal_point(const window *w, integer q, integer k)
 }
 
 /* Violations of the rows, zero for active ones, and the largest, which is not negative. */
-static double violations(const window *w, integer q, integer k)
+WIDE static double violations(const window *w, integer q, integer k)
 {
     const integer R = w->R, *rows = w->rows + q * w->K;
     const double *restrict act = w->act, *restrict upper = w->upper, *restrict lower = w->lower;
@@ -118,7 +118,7 @@ static leaving choose_leaving(const window *w, integer q, integer k)
 }
 
 /* alpha = row of the tableau over z, zero for basic variables; wk = the same over the active rows' bounds. */
-static void tableau_row(const window *w, integer q, integer k, leaving out)
+WIDE static void tableau_row(const window *w, integer q, integer k, leaving out)
 {
     const integer Z = w->Z, K = w->K;
     if (out.row < 0) {
@@ -145,7 +145,7 @@ static double flip_variable(const window *w, integer *status, integer j, double 
 }
 
 /* Carry out the flips and the entering move on z, the activities and the bounds of active rows. */
-static void move_point(const window *w, integer q, integer k, entering in, double side)
+WIDE static void move_point(const window *w, integer q, integer k, entering in, double side)
 {
     const integer Z = w->Z, K = w->K, *rows = w->rows + q * K, *cols = w->cols + q * K;
     const double *inverse = w->inverse + q * K * K;
@@ -242,7 +242,7 @@ static integer optimise(const window *w, integer q, integer limit)
 }
 
 /* Weak-duality bound of max cost'z for the multipliers of the active rows, rounded up. */
-static double outer_value(const window *w, integer q)
+WIDE static double outer_value(const window *w, integer q)
 {
     const integer Z = w->Z, k = w->k[q], *rows = w->rows + q * w->K;
     double *rest = w->alpha, size = 0.0, value = 0.0;

@@ -1,4 +1,4 @@
-/* The samples of a log, one after the other in one call. */
+/* Samples that are given with the call: one, or those of a log, one after the other. */
 #include "window.h"
 
 typedef struct { /* of the samples that are at hand; a schedule that changes nothing gives one row for all of them */
@@ -16,6 +16,20 @@ static void give(const window *w, const samples *given, integer i)
     copy(w->in_noise, given->noise + at * w->ny, w->ny);
     copy(w->in_w_lower, given->w_lower + at * w->nw, w->nw);
     copy(w->in_w_upper, given->w_upper + at * w->nw, w->nw);
+}
+
+/* `fdi_window_take` of a sample in normal form: u, u_next (nu,), y (ny,), stack (ni, X, P), noise, w_lower, w_upper. */
+EXPORTED integer fdi_window_take_sample(void *block, const double *u, const double *u_next, const double *y,
+                                        const double *stack, const double *noise, const double *w_lower,
+                                        const double *w_upper, double eps, integer limit)
+{
+    window w;
+    window_open(&w, block);
+    answer found;
+    const samples given = {u, u_next, y, stack, noise, w_lower, w_upper, 0};
+    give(&w, &given, 0);
+    const integer code = take(&w, eps, limit, &found);
+    return told(code, found);
 }
 
 /* Bounds of the newest state along the axes, to row i of the boxes (count, 2, n); 0 if a basis has no room. */
@@ -46,7 +60,7 @@ EXPORTED integer fdi_window_follow(void *block, integer count, integer is_schedu
     for (integer i = 0; i < count; i++) {
         give(&w, &given, i);
         const integer code = take(&w, eps, limit, &found);
-        *result = code + 8 * (found.verdict + 4 * (found.program + 1));
+        *result = told(code, found);
         if ((code != FINE && code != SIGN_OPEN) || found.verdict != CONSISTENT) return i;
         if (boxes && !store_box(&w, boxes, i, limit)) return i;
     }

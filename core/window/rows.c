@@ -18,11 +18,13 @@ void place_row(const window *w, integer i, integer s)
     w->upper[i] = smaller(size + 1.0, w->raw_upper[i] - offset + rounding);
 }
 
-/* A row that says nothing. */
+/* A row that says nothing. One without a scale has no entries yet. */
 void clear_row(const window *w, integer i)
 {
-    fill(w->G + i * w->Z, 0.0, w->Z);
-    for (integer j = 0; j < w->Z; j++) w->GT[j * w->R + i] = 0.0;
+    if (w->scale[i] != 0.0) {
+        fill(w->G + i * w->Z, 0.0, w->Z);
+        for (integer j = 0; j < w->Z; j++) w->GT[j * w->R + i] = 0.0;
+    }
     fill(w->row_x + i * w->n, 0.0, w->n);
     w->row_v[i] = 0.0;
     w->row_c[i] = 0.0;

@@ -191,6 +191,8 @@ integer take(const window *w, double eps, integer limit, answer *found)
     return code;
 }
 
+integer told(integer code, answer found) { return code + 8 * (found.verdict + 4 * (found.program + 1)); }
+
 /* A whole sample in one call: `enter`, `move`, `complete`, CHANNELS where signs are open, and ARRIVAL.
  *
  * Returns what `enter` returns, or OUTGROWN, + 8 (verdict + 4 (program + 1)), as `fdi_window_solve`. If the verdict is
@@ -201,7 +203,7 @@ EXPORTED integer fdi_window_take(void *block, double eps, integer limit)
     window_open(&w, block);
     answer found;
     const integer code = take(&w, eps, limit, &found);
-    return code + 8 * (found.verdict + 4 * (found.program + 1));
+    return told(code, found);
 }
 
 /* Anchor an empty window at the arrival bounds h, with `count` extra rows (count, n) on the first state. */

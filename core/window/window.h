@@ -275,6 +275,7 @@ integer maximise(const window *w, integer q, integer limit, double *bound);
 /* sample.c: a whole sample, whose data lie in in_*; `enter`, `move`, `complete`, CHANNELS where signs are open, and
  * ARRIVAL. Returns what `enter` returns, or OUTGROWN. */
 integer take(const window *w, double eps, integer limit, answer *found);
+integer told(integer code, answer found); /* both in one number */
 
 /* programs.c */
 answer solve_programs(const window *w, integer task, integer start, integer stop, integer limit);

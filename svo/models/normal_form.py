@@ -22,6 +22,7 @@ from polytopes import HPolytope
 from polytopes.value import Value
 from svo.checks import Array
 from svo.models.bounds import Bounds
+from svo.models.schedule_table import ScheduleTable
 from svo.models.stack import Stack
 from svo.models.state_range import StateRange
 
@@ -182,25 +183,30 @@ def lengthened(rows: Array, unit: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _ScaledStack(Value):
-    """A stack that is evaluated in the given units, where its errors speak of the user's numbers."""
+    """A stack that is evaluated in the given units, where its errors speak of the user's numbers; a table has none."""
 
     given: Stack
     factor: Array
     constant: Array = field(init=False)
+    table: ScheduleTable | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "constant", self.given.constant * self.factor)
         self.constant.setflags(write=False)
+        table = self.given.table
+        object.__setattr__(self, "table", None if table is None else table.times(self.factor))
 
     @property
     def scheduled(self) -> Any:
         return self.given.scheduled
 
     def at(self, schedule: Any) -> Array:
-        return self.given.at(schedule) * self.factor if self.given.scheduled else self.constant
+        if not self.given.scheduled:
+            return self.constant
+        return self.given.at(schedule) * self.factor if self.table is None else self.table(schedule)
 
     def over(self, schedule: ArrayLike) -> Array:
-        return self.given.over(schedule) * self.factor
+        return self.given.over(schedule) * self.factor if self.table is None else self.table.over(schedule)
 
 
 @dataclass(frozen=True, eq=False)

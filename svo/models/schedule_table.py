@@ -84,6 +84,10 @@ class ScheduleTable:
         result[at == self.points[-1]] = self.values[-1]  # without rounding, as one value alone gives it
         return result
 
+    def times(self, factor: Array) -> ScheduleTable:
+        """The table of the array times a ``factor`` of its shape, entry by entry."""
+        return ScheduleTable(self.points, self.values * factor)
+
     def has_points_of(self, other: ScheduleTable) -> bool:
         """Whether this table and the ``other`` are over the same points."""
         return self._knots == other._knots

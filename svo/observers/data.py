@@ -17,7 +17,7 @@ def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:
     array = floats("y", y, missing=True)
     if array.shape != (model.n_outputs,):
         raise ValueError(f"y has shape {array.shape}; expected ({model.n_outputs},), one value a sensor")
-    if any(map(math.isinf, array.tolist())):  # at every sample: short arrays, for which this is fastest
+    if math.isinf(math.hypot(*array.tolist())) and np.isinf(array).any():  # short arrays: the first is fastest
         raise ValueError(f"y is {array}; expected finite numbers, or NaN for a missing sensor")
     return array
 
@@ -33,7 +33,7 @@ def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: boo
     array = floats(name, u)
     if array.shape != (size,):
         raise ValueError(f"{name} has shape {array.shape}; expected ({size},), one value an input")
-    if not all(map(math.isfinite, array.tolist())):
+    if not (math.isfinite(math.hypot(*array.tolist())) or np.isfinite(array).all()):
         raise ValueError(f"{name} is {array}; expected finite numbers")
     return array
 

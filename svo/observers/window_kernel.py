@@ -7,6 +7,7 @@ everything there: what it is given of a sample was written to the arrays ``in_*`
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,6 +57,7 @@ _enter = native.function("fdi_window_enter", Address, returns=Integer)
 _move = native.function("fdi_window_move", Address, returns=Integer)
 _complete = native.function("fdi_window_complete", Address, Real, returns=Integer)
 _take = native.function("fdi_window_take", Address, Real, Integer, returns=Integer)
+_take_sample = native.function("fdi_window_take_sample", *[Address] * 8, Real, Integer, returns=Integer)
 _follow = native.function(
     "fdi_window_follow", Address, Integer, Integer, *[Address] * 7, Real, Integer, Address, Address, returns=Integer
 )
@@ -128,6 +130,18 @@ def take(address: int, eps: float, limit: int) -> tuple[int, int, int]:
     verdict is FULL the sample is half done: it goes on with the next call, once the window is in a block of larger K.
     """
     return _told(_take(address, eps, limit))
+
+
+def take_sample(address: int, sample: Iterable[Array], eps: float, limit: int) -> tuple[int, int, int]:
+    """`take` of a sample that is given with the call.
+
+    Parameters
+    ----------
+    sample : iterable of arrays
+        Floats in normal form: u, u_next (nu,), y (ny,); stack (ni, n + ny, n + nu + 1 + nw), noise (ny,), w_lower and
+        w_upper (nw,).
+    """
+    return _told(_take_sample(address, *[array.tobytes() for array in sample], eps, limit))
 
 
 def _told(found: int) -> tuple[int, int, int]:

@@ -143,11 +143,9 @@ def follow(rng: Generator, memory: Memory, strange: float) -> bool:
     scheduled = rng.random() < 0.5
     given = [np.ascontiguousarray(row if i < 3 or scheduled else row[:1]) for i, row in enumerate(rows)]
     boxes = np.empty((count, 2, memory.size.n)) if rng.random() < 0.5 else None
-    done, (code, verdict, _) = kernel.follow(memory.address, tuple(given), 1e-15, LIMIT, boxes)
+    done, told = kernel.follow(memory.address, tuple(given), 1e-15, LIMIT, boxes)
     assert 0 <= done <= count
-    if verdict == kernel.FULL:
-        memory.enlarge(2 * memory.size.K)
-        code, *_ = memory.take(1e-15)
+    code, *_ = memory.go_on(told, 1e-15)
     return code != kernel.OUTGROWN
 
 

@@ -13,6 +13,7 @@ from svo.checks import Array
 from svo.models import NormalForm
 from svo.observers import window_kernel as kernel
 from svo.observers.window.output_injection import OutputInjection, can_inject
+from svo.observers.window.sample import Sample
 from svo.observers.window.setup import channel_owners, disturbance_rows, jitter, output_is_disturbed
 
 _GROWING_START = 16
@@ -164,10 +165,15 @@ class Memory:
 
     # -- what the kernel does --------------------------------------------------------------------------
 
-    def take(self, eps: float) -> tuple[int, int, int]:
-        """`kernel.take`, with as much room for bases as it needs."""
-        while (found := kernel.take(self.address, eps, kernel.PIVOT_LIMIT))[1] == kernel.FULL:
+    def take(self, sample: Sample, eps: float) -> tuple[int, int, int]:
+        """`kernel.take_sample`, with as much room for bases as it needs."""
+        return self.go_on(kernel.take_sample(self.address, sample[:-1], eps, kernel.PIVOT_LIMIT), eps)
+
+    def go_on(self, found: tuple[int, int, int], eps: float) -> tuple[int, int, int]:
+        """What the kernel told of a sample, which it goes on with where it has stopped for more room."""
+        while found[1] == kernel.FULL:
             self.enlarge(2 * self.size.K)
+            found = kernel.take(self.address, eps, kernel.PIVOT_LIMIT)
         return found
 
     def solve(self, task: int, start: int, stop: int, limit: int) -> tuple[int, int]:

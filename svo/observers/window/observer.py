@@ -320,7 +320,8 @@ class WindowObserver(Observer):
         """Model and data of a sample, in normal form."""
         form = self._form
         stack, (w_lower, w_upper, noise) = self._normal.stack(schedule), self._normal.bounds(schedule)
-        return Sample(form.inputs(u), form.inputs(u_next), form.outputs(y), stack, noise, w_lower, w_upper, y)
+        u_next = form.inputs(u_next) if self._wants_next_input else u_next  # else zeros
+        return Sample(form.inputs(u), u_next, form.outputs(y), stack, noise, w_lower, w_upper, y)
 
     def _take(self, sample: Sample, end: float | None) -> VerdictName:
         if self._lost:

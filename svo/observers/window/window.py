@@ -125,8 +125,7 @@ class Window:
         if self._room == 0:
             memory = self._grow()
         if self._takes_whole and end is None:
-            self._hand_over(sample)
-            return self.concluded(memory.take(self.settings.eps), sample.given)
+            return self.concluded(memory.take(sample, self.settings.eps), sample.given)
         self._enter(sample, end)
         return self._cut_arrival(self._decide(end))
 
@@ -143,7 +142,7 @@ class Window:
         memory, eps, self.reason = self.memory, self.settings.eps, None
         memory.check_whole()
         done, told = kernel.follow(memory.address, samples, eps, kernel.PIVOT_LIMIT, boxes)
-        return done, memory.take(eps) if told[1] == kernel.FULL else told
+        return done, memory.go_on(told, eps)
 
     @property
     def takes_at_once(self) -> int:
