@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 Shape = tuple[int | str, ...]  # a name stands for any size
 Item = TypeVar("Item")
 
+_FLOAT = np.dtype(np.float64)
 _EXACT = 2**53  # integers up to here are floats
 _NUMBERS = "biuf"  # kinds of dtypes: truth values, integers, floats
 _PLAIN = (np.matrix, np.memmap)  # subclasses of arrays that mean no more than their numbers
@@ -121,7 +122,7 @@ def listed(name: str, value: Any, kind: type[Item]) -> list[Item]:
 
 
 def _is_float_array(value: Any) -> bool:
-    return type(value) is np.ndarray and value.dtype == np.float64
+    return type(value) is np.ndarray and value.dtype == _FLOAT
 
 
 def _masked() -> tuple[type, ...]:
@@ -185,12 +186,19 @@ def _check_shape(name: str, array: Floats, shapes: Sequence[Shape], meaning: str
     if not shapes:
         return
     for shape in shapes:
-        if len(shape) == array.ndim and all(
-            isinstance(want, str) or want == size for want, size in zip(shape, array.shape, strict=True)
-        ):
+        if _fits(array.shape, shape):
             return
     wanted = " or ".join(_shape_text(shape) for shape in shapes)
     raise ValueError(f"{name} has shape {array.shape}; expected {wanted}{', ' if meaning else ''}{meaning}.")
+
+
+def _fits(found: tuple[int, ...], shape: Shape) -> bool:
+    if len(found) != len(shape):
+        return False
+    for size, want in zip(found, shape, strict=True):
+        if size != want and not isinstance(want, str):
+            return False
+    return True
 
 
 def _shape_text(shape: Shape) -> str:

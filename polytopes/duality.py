@@ -28,10 +28,13 @@ class Bounds:
         sides = np.where(beside > 0.0, (self.beside + beside) * (1.0 + 1e-9), self.beside)
         return Bounds(_raised(self.values, self.spare, values * (1.0 + 1e-9)), np.zeros_like(self.spare), sides)
 
-    def over(self, reach: Floats) -> Floats:
-        """Upper bounds (k,) of the forms where ``|x| <= reach``; inf where nothing bounds them."""
-        terms = self.beside * np.where(self.beside > 0.0, reach, 0.0)
-        return _raised(self.values, self.spare, terms.sum(axis=1) * (1.0 + (reach.size + 4) * _EPS))
+    def gaps(self, forms: Floats, points: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
+        """Upper bounds (k,) of the forms (k, n) where ``|x| <= reach`` (n,), inf where nothing bounds them.
+
+        How far they are above the values at the points (k, n), and the sizes of the terms of both come with them.
+        """
+        return kernel.gaps(forms, points, (self.values, self.spare, self.beside), reach)
+
 
 
 def _raised(values: Floats, spare: Floats, more: Floats) -> Floats:

@@ -11,12 +11,11 @@ from typing import Literal
 import numpy as np
 from flint import fmpq
 
+from polytopes import kernel
 from polytopes.certificate import Certificate, HasRows, complete_certificate, exact_combination
 from polytopes.checks import Floats
 from polytopes.exact import ZERO, Multipliers, combine, to_floats
 from polytopes.linear_program import Program, prepare
-
-_EPS = float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,15 +89,9 @@ def strictly_inside(program: Program, z: Floats) -> bool:
     Every slack must exceed the rounding error of its computation and of the elimination of equalities; rows that are
     constant on the affine set are checked already.
     """
-    if program.violated is not None or not np.isfinite(z).all():
+    if program.violated is not None:
         return False
-    size = np.abs(z)
-    slack = program.rhs - z @ program.AT
-    error = (z.size + 3) * _EPS * (size @ np.abs(program.AT) + np.abs(program.rhs))
-    if program.flat.pivots:
-        of_rows, of_rhs = program.errors
-        error += (of_rows @ size + of_rhs) * (1.0 + (z.size + 3) * _EPS)
-    return bool((slack > error).all())
+    return kernel.strictly_inside(program.AT, program.rhs, z, program.errors if program.flat.pivots else None)
 
 
 def float_combination(P: HasRows, program: Program) -> Certificate | None:

@@ -29,8 +29,10 @@ def _room(name: str, sizes: int) -> Any:
 
 _interior = function("fdi_interior", *[Integer] * 2, *[Given] * 4, Real, Entries, Address, returns=Integer)
 _interior_room = _room("interior", 2)
-_supports = function("fdi_supports", *[Integer] * 3, *[Given] * 4, *[Entries] * 2, Address)
+_strictly_inside = function("fdi_strictly_inside", *[Integer] * 2, *[Given] * 3, *[Address] * 3, returns=Integer)
+_supports = function("fdi_supports", *[Integer] * 3, *[Given] * 4, *[Entries] * 3, Address)
 _supports_room = _room("supports", 3)
+_gaps = function("fdi_gaps", *[Integer] * 2, *[Given] * 6, Entries)
 _irredundant = function("fdi_irredundant", *[Integer] * 2, *[Given] * 3, *[Entries] * 2, Address, returns=Integer)
 _irredundant_room = _room("irredundant", 2)
 _eliminate = function("fdi_eliminate", *[Integer] * 3, *[Entries] * 10, returns=Integer)
@@ -41,8 +43,8 @@ _scaled = function("fdi_scaled", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, A
 _scaled_room = _room("scaled", 2)
 
 
-def interior(AT: Floats, b: Floats, norms: Floats, x0: Floats, cap: float) -> tuple[Floats, float, int, Floats]:
-    """Largest ball ``a_i'x + |a_i| r <= b_i`` with ``r <= cap``.
+def interior(AT: Floats, b: Floats, norms: Floats, x0: Floats, times: float) -> tuple[Floats, float, int, Floats]:
+    """Largest ball ``a_i'x + |a_i| r <= b_i``, up to a limit of its radius.
 
     Parameters
     ----------
@@ -52,24 +54,40 @@ def interior(AT: Floats, b: Floats, norms: Floats, x0: Floats, cap: float) -> tu
         Euclidean norms of the rows.
     x0 : array (d,)
         Any starting point; it need not be feasible.
-    cap : float
-        Upper limit of the radius; keeps the program bounded on unbounded sets.
+    times : float
+        The limit, in largest entries of b (in ones, if b is zero); keeps the program bounded on unbounded sets.
 
     Returns
     -------
     x, r, status, multipliers
-        Centre (d,), radius (negative if the rows have no common point), status, and multipliers of the rows (m,).
+        Centre (d,), radius (negative if the rows have no common point, inf about the limit), status, and multipliers of the rows (m,).
         With r < 0 they combine the rows to ``0'x <= r``: Farkas' multipliers.
     """
     d, m = AT.shape
     found = np.empty(d + 1 + m)
-    status = _interior(d, m, AT, b, norms, x0, cap, found, scratch(_interior_room(d, m)))
-    return found[:d], float(found[d]), status, found[d + 1 :]
+    status = _interior(d, m, AT, b, norms, x0, times, found, scratch(_interior_room(d, m)))
+    return found[:d], found.item(d), status, found[d + 1 :]
+
+
+def strictly_inside(AT: Floats, b: Floats, z: Floats, errors: tuple[Floats, Floats] | None) -> bool:
+    """Whether every slack of a point exceeds what is rounded in it, and in its row.
+
+    Parameters
+    ----------
+    AT, b : arrays (d, m) and (m,)
+        Scaled rows, transposed.
+    z : array (d,)
+    errors : arrays (m, d) and (m,), optional
+        Bounds of what was rounded in the entries of the rows and of b.
+    """
+    d, m = AT.shape
+    of_rows, of_rhs = (None, None) if errors is None else (error.tobytes() for error in errors)
+    return bool(_strictly_inside(d, m, AT, b, z, of_rows, of_rhs, scratch(2 * m)))
 
 
 def supports(
     AT: Floats, b: Floats, x0: Floats, directions: Floats
-) -> tuple[Floats, Indices, Floats, Floats, Floats, Floats, Indices]:
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Indices, Indices]:
     """Support points in k directions, each program started from the vertex of its neighbour.
 
     Parameters
@@ -82,18 +100,41 @@ def supports(
 
     Returns
     -------
-    points, active, multipliers, bounds, spare, beside, status
-        Arrays (k, d), (k, d), (k, d), (k,), (k,), (k, d), (k,).  All but the last mean something only where the status
+    points, multipliers, bounds, spare, beside, active, status
+        Arrays (k, d), (k, m), (k,), (k,), (k, d), (k, d), (k,).  All but the last mean something only where the status
         is `OPTIMAL`: then ``c'x <= bounds - spare + beside'|x|`` for all x of the set.
     """
     (d, m), k = AT.shape, len(directions)
-    found, codes = np.empty((3 * d + 2, k)), np.empty((d + 1, k), np.int64)
+    found, codes, weights = np.empty((3 * d + 2, k)), np.empty((d + 1, k), np.int64), np.zeros((k, m))
     _supports(
-        d, m, k, AT, b, x0, directions, found, codes,
+        d, m, k, AT, b, x0, directions, found, codes, weights,
         scratch(_supports_room(d, m, k)),
     )  # fmt: skip
-    points, multipliers, beside = found[: 3 * d].reshape(3, k, d)
-    return points, codes[:d].reshape(k, d), multipliers, found[3 * d], found[3 * d + 1], beside, codes[d]
+    points, _, beside = found[: 3 * d].reshape(3, k, d)
+    return points, weights, found[3 * d], found[3 * d + 1], beside, codes[:d].reshape(k, d), codes[d]
+
+
+def gaps(
+    forms: Floats, points: Floats, bounds: tuple[Floats, Floats, Floats], reach: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """How near upper bounds of k forms over a set are to their values at points, where ``|x| <= reach`` all over it.
+
+    Parameters
+    ----------
+    forms, points : arrays (k, d)
+    bounds : arrays (k,), (k,) and (k, d)
+        Values, spare and beside: ``c'x <= values - spare + beside'|x|`` for each form c.
+    reach : array (d,)
+
+    Returns
+    -------
+    values, gaps, terms : arrays (k,)
+        Bounds of the forms; how far they are above the values at the points; the sizes of the terms of both.
+    """
+    (k, d), found = forms.shape, np.empty((3, len(forms)))
+    _gaps(d, k, forms, points, *bounds, reach, found)
+    values, above, terms = found
+    return values, above, terms
 
 
 def irredundant(AT: Floats, b: Floats, x0: Floats) -> tuple[Indices, Indices]:

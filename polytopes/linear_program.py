@@ -29,6 +29,7 @@ Indices = NDArray[np.int64]
 _KERNEL_VARIABLES = 40
 _KERNEL_ENTRIES = 200_000
 _EPS = float(np.finfo(np.float64).eps)
+_WIDEST = 4.0  # of the size of b: by duality no radius is beyond max |b_i| / |a_i|, and no norm is below 1/2
 _CLEAN = 1e-9  # relative gap between a maximum and its bound that is still accepted from floats
 _SHARP = 1e-6  # the same gap, of the radius of a largest ball
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
@@ -162,21 +163,19 @@ class Program:
         if kept == 0:
             origin = np.zeros(free)
             return Interior(self.lift(origin), origin, np.inf, np.zeros(0), True)
-        # By duality a largest ball has a radius of at most max |b_i| / |a_i|, or none at all.
-        cap = 2.0 * self.size / float(self.norms.min())
         if self._small:
-            z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), cap)
+            z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), _WIDEST)
             if status == kernel.OPTIMAL:
-                return Interior(self.lift(z), z, _uncapped(radius, cap), weights, True)
-        return self._interior_by_highs(cap)
+                return Interior(self.lift(z), z, radius, weights, True)
+        return self._interior_by_highs()
 
-    def _interior_by_highs(self, cap: float) -> Interior:
-        free, kept = self.AT.shape
+    def _interior_by_highs(self) -> Interior:
+        (free, kept), cap = self.AT.shape, _WIDEST * self.size
         rows = np.vstack([np.hstack([self.AT.T, self.norms[:, None]]), np.append(np.zeros(free), 1.0)])
         answer = HighsProgram(rows, np.append(self.rhs, cap)).maximise(np.append(np.zeros(free), 1.0))
         point = answer.point if answer.point.size == free + 1 else np.zeros(free + 1)
         weights = answer.multipliers[:kept] if answer.multipliers.size == kept + 1 else np.zeros(kept)
-        radius = _uncapped(point[-1], cap)
+        radius = float(point[-1]) if point[-1] < 0.99 * cap else np.inf
         z = point[:-1].copy()
         return Interior(self.lift(z), z, radius, np.maximum(weights, 0.0), answer.status == "optimal")
 
@@ -316,12 +315,10 @@ class Program:
             of_forms = self.flat.restriction_errors(directions, np.zeros(len(directions)))[0]
             beside = np.ldexp(np.ldexp(of_forms, self.powers), -tops[:, None])
             bounds = bounds.widened(found.weights @ of_rhs, beside + found.weights @ of_rows)
-        values = bounds.over(self._reach) if bounds.beside.any() else bounds.values
-        gap = values - (reduced * found.points).sum(axis=1)
-        terms = (np.abs(reduced) * np.abs(found.points)).sum(axis=1) + np.abs(values)
+        reach = self._reach if bounds.beside.any() else np.zeros(self.powers.size)
+        values, gap, terms = bounds.gaps(reduced, found.points, reach)
         room = np.minimum(_CLEAN * terms, _SHARP * max(self.interior.radius, 0.0) + 8.0 * _EPS * terms)
-        near = (gap <= room) & np.isfinite(values)
-        for q in np.flatnonzero(~near):
+        for q in np.flatnonzero(~((gap <= room) & np.isfinite(values))):
             if found.status[q] == OPTIMAL:
                 found.status[q] = UNDECIDED
         return values
@@ -373,10 +370,7 @@ class Program:
         )
 
     def _by_kernel(self, reduced: Floats) -> _Solved:
-        points, active, y, values, spare, beside, status = kernel.supports(self.AT, self.rhs, self.centre, reduced)
-        weights = np.zeros((len(reduced), self.kept.size))
-        row, slot = np.nonzero(active >= 0)
-        weights[row, active[row, slot]] = y[row, slot]
+        points, weights, values, spare, beside, _, status = kernel.supports(self.AT, self.rhs, self.centre, reduced)
         names = [_NAMES.get(code, UNDECIDED) for code in status.tolist()]
         return _Solved(points, weights, Bounds(values, spare, beside), names)
 
@@ -480,8 +474,10 @@ def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
         constant = np.setdiff1d(np.arange(b.size), kept)
         violated = next((int(i) for i in constant if rhs[i] < 0.0), None)
     if units is None:
-        units, row_units = powers, -np.frexp(b)[1].astype(np.int64)
-        row_units[kept] = row_powers
+        units, row_units = powers, row_powers
+        if kept.size < b.size:
+            row_units = -np.frexp(b)[1].astype(np.int64)
+            row_units[kept] = row_powers
     exact = EvenRows(A, b, flat, row_units[: b.size], units)
     return Program(A, b, flat, exact, AT, even, norms, row_powers, powers, kept, violated)
 
@@ -510,10 +506,6 @@ def _refuse_extremes(A: Floats, b: Floats, far: int, lost: int) -> None:
             f"row {lost} of A, {A[lost].tolist()}, has entries of so different sizes that no units make floats of them "
             "all. Leave out entries that do not matter."
         )
-
-
-def _uncapped(radius: float, cap: float) -> float:
-    return float(radius) if radius < 0.99 * cap else np.inf
 
 
 def _least_squares(A: Floats, b: Floats) -> Floats:

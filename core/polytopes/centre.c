@@ -1,10 +1,31 @@
-/* Rows seen from a point strictly inside: without duplicates, the origin there, each axis and each slack about one. */
+/* A point strictly inside, and the rows seen from it: without duplicates, each axis and each slack about one. */
 #include "polytopes/polytopes.h"
 #include "polytopes/sums.h"
 #include "powers.h"
 #include "vectors.h"
 
 static const double ROUNDED_SLACK = 1e-14; /* of a slack: rounding beyond is computed */
+
+/* Whether every slack of a point z (d,) exceeds what is rounded in it, and in its row.
+ *
+ * at (d, m), b (m,): rows; of_rows (m, d) and of_rhs (m,): bounds of what was rounded in them, or both NULL; room (2 m,).
+ */
+EXPORTED integer fdi_strictly_inside(integer d, integer m, const double *at, const double *b, const double *z,
+                                     const double *of_rows, const double *of_rhs, double *room)
+{
+    const double unit = (double)(d + 3) * EPS;
+    double *slack = room, *error = room + m;
+    for (integer i = 0; i < m; i++) slack[i] = b[i], error[i] = unit * fabs(b[i]);
+    for (integer j = 0; j < d; j++) {
+        const double *a = at + j * m, size = fabs(z[j]), part = unit * size;
+        for (integer i = 0; i < m; i++) slack[i] -= a[i] * z[j], error[i] += part * fabs(a[i]);
+        for (integer i = 0; of_rows && i < m; i++) error[i] += size * of_rows[i * d + j] * (1.0 + unit);
+    }
+    if (of_rhs) add_multiple(error, 1.0 + unit, of_rhs, m);
+    integer inside = 1;
+    for (integer i = 0; i < m; i++) inside &= slack[i] > error[i];
+    return inside;
+}
 
 /* b_i - a_i'x as if in twice the precision (Ogita, Rump and Oishi 2005). */
 static double precise_slack(const Rows *rows, const double *x, integer i)

@@ -60,3 +60,25 @@ double dual_bound(const Rows *rows, const double *c, State *at, double *beside, 
     }
     return upper(bound, spare);
 }
+
+/* How near upper bounds of k forms over a set are to their values at points, where |x| <= reach (d,) all over it.
+ *
+ * forms, points (k, d); c'x <= bounds - spare + beside'|x| for each, arrays (k,), (k,) and (k, d). Leaves in `found`
+ * the bounds of c'x (k,), how far they are above the values (k,), and the sizes of the terms of both (k,).
+ */
+EXPORTED void fdi_gaps(integer d, integer k, const double *forms, const double *points, const double *bounds,
+                       const double *spare, const double *beside, const double *reach, double *found)
+{
+    for (integer q = 0; q < k; q++) {
+        double more = 0.0, value = 0.0, size = 0.0, bound = bounds[q];
+        for (integer j = 0; j < d; j++) {
+            const double part = forms[q * d + j] * points[q * d + j], off = beside[q * d + j];
+            value += part;
+            size += fabs(part);
+            if (off > 0.0) more += off * reach[j];
+        }
+        more *= 1.0 + (double)(d + 4) * EPS;
+        if (more > spare[q]) bound = isfinite(bound + more) ? next_up(bound + more) : INFINITY;
+        found[q] = bound, found[k + q] = bound - value, found[2 * k + q] = size + fabs(bound);
+    }
+}

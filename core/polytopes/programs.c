@@ -2,6 +2,7 @@
 #include "polytopes/polytopes.h"
 #include "vectors.h"
 
+static const double BEYOND = 0.99;  /* of the limit of a radius: from there on it has none */
 static const integer CHAINED = 128; /* directions; more are taken in their order */
 
 /* Rows of the largest ball in (x, r): a_i'x + |a_i| r <= b_i, and r <= cap last. */
@@ -37,19 +38,20 @@ static void lift(Ball *ball, integer d, integer m, const double *at, const doubl
     ball->b[m] = cap;
 }
 
-/* Largest ball a_i'x + |a_i| r <= b_i with r <= cap, which keeps the program bounded on unbounded sets.
+/* Largest ball a_i'x + |a_i| r <= b_i with r at most so many times the largest |b_i|, which keeps the program bounded.
  *
  * at (d, m), b (m,): scaled rows; norms (m,): their lengths; x0 (d,): any point, it need not be feasible.
- * Leaves in `found` the centre (d,), the radius (negative if the rows have no common point), and the multipliers of the
- * rows (m,): with a negative radius they combine the rows to 0'x <= r (Farkas). Returns the status.
+ * Leaves in `found` the centre (d,), the radius (negative if the rows have no common point, infinite near its limit), and
+ * multipliers of the rows (m,): with a negative radius they combine the rows to 0'x <= r (Farkas). Returns the status.
  */
 EXPORTED integer fdi_interior(integer d, integer m, const double *at, const double *b, const double *norms,
-                              const double *x0, double cap, double *found, double *block)
+                              const double *x0, double times, double *found, double *block)
 {
     Ball ball;
     lay_out_ball(&ball, block, d, m);
-    lift(&ball, d, m, at, b, norms, cap);
     const Rows given = {d, m, m, at, b}, rows = {d + 1, m + 1, m + 1, ball.at, ball.b};
+    const double scale = scale_of(&given), cap = times * scale;
+    lift(&ball, d, m, at, b, norms, cap);
     State *state = &ball.state;
     slacks(&given, x0, state->s);
     double radius = cap;
@@ -60,9 +62,10 @@ EXPORTED integer fdi_interior(integer d, integer m, const double *at, const doub
     fill(ball.c, 0.0, d);
     ball.c[d] = 1.0;
     fill(state->y, 0.0, d + 1);
-    const integer status = optimise(&rows, ball.c, state, scale_of(&given));
+    const integer status = optimise(&rows, ball.c, state, scale);
     double *weights = found + d + 1;
     copy(found, state->x, d + 1);
+    if (found[d] >= BEYOND * cap) found[d] = INFINITY;
     fill(weights, 0.0, m);
     for (integer k = 0; k <= d; k++)
         if (state->W[k] >= 0 && state->W[k] < m) weights[state->W[k]] = state->y[k];
@@ -117,10 +120,10 @@ EXPORTED integer fdi_supports_room(integer d, integer m, integer k)
  * at (d, m), b (m,): scaled rows; x0 (d,): a feasible point. Results: found holds points (k, d), multipliers (k, d),
  * beside (k, d), bounds (k,) and spare (k,), one after the other; codes holds active rows (k, d) and statuses (k,).
  * All but the status mean something only where it is OPTIMAL: then c'x <= bounds - spare + beside'|x| for all x of the
- * set (see dual_bound).
+ * set (see dual_bound). weights (k, m), zero before: the multipliers again, by their rows.
  */
 EXPORTED void fdi_supports(integer d, integer m, integer k, const double *at, const double *b, const double *x0,
-                           const double *directions, double *found, integer *codes, double *block)
+                           const double *directions, double *found, integer *codes, double *weights, double *block)
 {
     Chain chain;
     lay_out_chain(&chain, block, d, m, k);
@@ -139,8 +142,11 @@ EXPORTED void fdi_supports(integer d, integer m, integer k, const double *at, co
         state->y = multipliers + q * d;
         status[q] = optimise(&rows, c, state, scale);
         copy(points + q * d, state->x, d);
-        for (integer j = 0; j < d; j++) codes[q * d + j] = state->W[j];
         if (status[q] == OPTIMAL) bounds[q] = dual_bound(&rows, c, state, beside + q * d, spare + q, chain.work);
+        for (integer j = 0; j < d; j++) {
+            const integer row = codes[q * d + j] = state->W[j];
+            if (row >= 0) weights[q * m + row] = state->y[j];
+        }
         if (status[q] == LIMIT || status[q] == AMBIGUOUS) begin(&rows, x0, state);
     }
 }

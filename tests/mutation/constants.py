@@ -81,7 +81,7 @@ CONSTANTS = (
     Constant("polytopes.hull", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.affine_image", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.preimage", "_EPS", "outward", f"{SETS}/test_outward.py"),
-    Constant("polytopes.emptiness", "_EPS", "outward", ROUNDED),
+    Constant("core/polytopes/centre.c", "EPS", "outward", ROUNDED),
     Constant("svo.logs.columns", "TIME_TOLERANCE", "tolerance", "tests/svo/logs/test_log_file.py"),
     Constant(
         "svo.analysis.model_pair", "LEAST_SEPARATION", "tolerance", "tests/svo/analysis/test_distinguishability.py"

@@ -72,7 +72,7 @@ def test_bounds_are_not_undercut_by_an_exact_vertex(seed: int) -> None:
     P = HPolytope(A, rng.uniform(0.5, 1.5, m))
     AT, b = P.program.AT, P.program.rhs
     C = rng.standard_normal((5, d))
-    _, active, _, bounds, spare, beside, status = kernel.supports(AT, b, P.program.centre, C)
+    _, _, bounds, spare, beside, active, status = kernel.supports(AT, b, P.program.centre, C)
     for q in np.flatnonzero(status == kernel.OPTIMAL):
         x = exact_vertex(AT, b, active[q])
         value = sum(Fraction(c) * v for c, v in zip(C[q].tolist(), x, strict=True))

@@ -15,7 +15,8 @@ integer fdi_eliminate(integer room, integer max_rows, integer cautious, double *
                       integer *progress, double *block);
 integer fdi_supports_room(integer d, integer m, integer k);
 void fdi_supports(integer d, integer m, integer k, const double *at, const double *b, const double *x0,
-                  const double *directions, double *found, integer *codes, double *block);
+                  const double *directions, double *found, integer *codes, double *weights,
+                  double *block);
 
 enum { DIM = 4, ROOM = 400, MOST = 100 };
 
@@ -71,15 +72,16 @@ static integer eliminate(Shadow *of, const double *table, integer rows, integer 
 static double support(integer d, integer m, const double *table, const double *direction)
 {
     double at[DIM * ROOM], b[ROOM], found[3 * DIM + 2], origin[DIM] = {0.0};
-    double *block = room_of(fdi_supports_room(d, m, 1));
+    double *block = room_of(fdi_supports_room(d, m, 1)), *weights = calloc((size_t)m, sizeof(double));
     integer codes[DIM + 1];
     for (integer i = 0; i < m; i++) {
         const double norm = sqrt(sum_of_squares(table + i * (d + 1), d));
         for (integer j = 0; j < d; j++) at[j * m + i] = table[i * (d + 1) + j] / norm;
         b[i] = table[i * (d + 1) + d] / norm;
     }
-    fdi_supports(d, m, 1, at, b, origin, direction, found, codes, block);
+    fdi_supports(d, m, 1, at, b, origin, direction, found, codes, weights, block);
     CHECK(codes[d] == OPTIMAL);
+    free(weights);
     free(block);
     return dot(direction, found, d);
 }

@@ -10,7 +10,8 @@ integer fdi_interior(integer d, integer m, const double *at, const double *b, co
                      double cap, double *found, double *block);
 integer fdi_supports_room(integer d, integer m, integer k);
 void fdi_supports(integer d, integer m, integer k, const double *at, const double *b, const double *x0,
-                  const double *directions, double *found, integer *codes, double *block);
+                  const double *directions, double *found, integer *codes, double *weights,
+                  double *block);
 
 enum { SIDES = 9, DIRECTIONS = 5 };
 
@@ -43,18 +44,19 @@ static double over_corners(integer m, const double *at, const double *b, const d
 
 static void supports_of_a_polygon(integer m)
 {
-    double at[2 * SIDES], b[SIDES], directions[2 * DIRECTIONS], found[8 * DIRECTIONS];
+    double at[2 * SIDES], b[SIDES], directions[2 * DIRECTIONS], found[8 * DIRECTIONS], weights[SIDES * DIRECTIONS] = {0.0};
     integer codes[3 * DIRECTIONS];
     double *block = room_of(fdi_supports_room(2, m, DIRECTIONS));
     const double origin[] = {0.0, 0.0};
     polygon(m, at, b);
     draw(directions, 2 * DIRECTIONS);
-    fdi_supports(2, m, DIRECTIONS, at, b, origin, directions, found, codes, block);
+    fdi_supports(2, m, DIRECTIONS, at, b, origin, directions, found, codes, weights, block);
     for (integer q = 0; q < DIRECTIONS; q++) {
         const double expected = over_corners(m, at, b, directions + 2 * q), bound = found[6 * DIRECTIONS + q];
         CHECK(codes[2 * DIRECTIONS + q] == OPTIMAL);
         CHECK(near(dot(directions + 2 * q, found + 2 * q, 2), expected, 1e-13));
         CHECK(bound >= expected - 1e-15 && bound <= expected + 1e-13);
+        CHECK(near(dot(weights + q * m, b, m), expected, 1e-13));
         for (integer j = 0; j < 2; j++) CHECK(codes[2 * q + j] >= 0 && codes[2 * q + j] < m);
     }
     free(block);
@@ -97,8 +99,9 @@ static void no_end(void)
 {
     const double at[] = {-1.0, 0.0, 0.0, -1.0}, b[] = {0.0, 0.0}, x0[] = {1.0, 1.0}, directions[] = {1.0, 1.0, -1.0, -2.0};
     double found[16], *block = room_of(fdi_supports_room(2, 2, 2));
+    double weights[4] = {0.0};
     integer codes[6];
-    fdi_supports(2, 2, 2, at, b, x0, directions, found, codes, block);
+    fdi_supports(2, 2, 2, at, b, x0, directions, found, codes, weights, block);
     CHECK(codes[4] == UNBOUNDED);
     CHECK(codes[5] == OPTIMAL && fabs(found[12 + 1]) < 1e-15);
     free(block);
