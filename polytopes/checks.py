@@ -185,20 +185,14 @@ def _check_kind(name: str, raw: NDArray[Any], value: Any) -> None:
 def _check_shape(name: str, array: Floats, shapes: Sequence[Shape], meaning: str) -> None:
     if not shapes:
         return
-    for shape in shapes:
-        if _fits(array.shape, shape):
-            return
+    if any(len(array.shape) == len(shape) and all(map(_fits, array.shape, shape)) for shape in shapes):
+        return
     wanted = " or ".join(_shape_text(shape) for shape in shapes)
     raise ValueError(f"{name} has shape {array.shape}; expected {wanted}{', ' if meaning else ''}{meaning}.")
 
 
-def _fits(found: tuple[int, ...], shape: Shape) -> bool:
-    if len(found) != len(shape):
-        return False
-    for size, want in zip(found, shape, strict=True):
-        if size != want and not isinstance(want, str):
-            return False
-    return True
+def _fits(size: int, want: int | str) -> bool:
+    return size == want or isinstance(want, str)
 
 
 def _shape_text(shape: Shape) -> str:

@@ -36,7 +36,6 @@ class Bounds:
         return kernel.gaps(forms, points, (self.values, self.spare, self.beside), reach)
 
 
-
 def _raised(values: Floats, spare: Floats, more: Floats) -> Floats:
     """Floats that are at least ``values - spare + more``."""
     return np.where(more > spare, np.nextafter(values + more, np.inf), values)

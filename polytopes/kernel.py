@@ -60,8 +60,8 @@ def interior(AT: Floats, b: Floats, norms: Floats, x0: Floats, times: float) -> 
     Returns
     -------
     x, r, status, multipliers
-        Centre (d,), radius (negative if the rows have no common point, inf about the limit), status, and multipliers of the rows (m,).
-        With r < 0 they combine the rows to ``0'x <= r``: Farkas' multipliers.
+        Centre (d,), radius (negative if the rows have no common point, inf about the limit), status, and multipliers of
+        the rows (m,). With r < 0 they combine the rows to ``0'x <= r``: Farkas' multipliers.
     """
     d, m = AT.shape
     found = np.empty(d + 1 + m)

@@ -185,7 +185,8 @@ def test_bounds_from_any_multipliers_hold() -> None:
         A = np.vstack([A, np.eye(3), -np.eye(3)])
         b = np.append(rng.random(9), np.ones(6))
         y = np.maximum(HPolytope(A, b).support_points(c).multipliers[0] + 1e-9 * rng.standard_normal(15), 0.0)
-        bound = duality.multiplier_bounds(np.ascontiguousarray(A.T), b, c, y).gaps(c[None], np.zeros((1, 3)), np.ones(3))[0][0]
+        bounds = duality.multiplier_bounds(np.ascontiguousarray(A.T), b, c, y)
+        bound = bounds.gaps(c[None], np.zeros((1, 3)), np.ones(3))[0][0]
         assert Fraction(float(bound)) >= exact_support(polyhedron(HPolytope(A, b)), c)
 
 
