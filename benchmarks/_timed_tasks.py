@@ -120,10 +120,7 @@ def tasks() -> Iterator[tuple[str, Callable[[], Turn]]]:
             yield f"redundancy, tangent ({n}, {m})", lambda n=n, m=m: redundancy(tangent(n, m))  # type: ignore[misc]
     for n, k, m, few in ((8, 4, 50, 2), (8, 3, 40, 3), (5, 3, 40, 3), (5, 3, 40, 5), (6, 2, 40, 6), (6, 3, 60, 6),
                          (6, 4, 40, 6), (6, 4, 60, 6), (7, 3, 40, 7), (7, 4, 30, 7), (8, 4, 30, 8)):  # fmt: skip
-        yield (
-            f"projection R^{n} -> R^{k}, {m} rows, {few} nonzeros",
-            lambda n=n, k=k, m=m, few=few: projection(n, k, m, few),
-        )  # type: ignore[misc]  # noqa: E501
+        yield f"projection R^{n} -> R^{k}, {m} rows, {few} nonzeros", lambda n=n, k=k, m=m, few=few: projection(n, k, m, few)  # type: ignore[misc]  # noqa: E501
     yield "sum with a box (4, 50)", sum_with_box
     yield "hull of 4 sets (4, 50)", hull
 
