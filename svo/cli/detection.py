@@ -43,7 +43,9 @@ def detect(
     """
     from svo.cli.progress import progress
     from svo.detection.alarm_folder import check_no_results
+    from svo.detection.streamed import detect_streamed
     from svo.plant.description import check_kept_description
+    from svo.plant.long_log import survey_log
 
     if out is not None:
         check_no_results(out)
@@ -51,9 +53,9 @@ def detect(
     if out is not None:
         check_kept_description(the_plant, out)
     noise = chosen_noise(the_plant, noise)
-    samples = face.read_log(log, the_plant)
+    samples = survey_log(log, the_plant)
     with progress("Samples") as update:
-        found = face.detect(the_plant, samples, noise, progress=update)
+        found = detect_streamed(the_plant, samples, noise, progress=update)
     if out is not None:
         found.save(out)
     if as_json:

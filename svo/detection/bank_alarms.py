@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from svo.isolation import Alarm, BankRecord
+from svo.checks import Array
+from svo.isolation import Alarm, BankRecord, Outcome
 from svo.logs.log import Log
 from svo.models import model_digest
 from svo.observers.base import Certificate, Observer
@@ -21,13 +22,23 @@ def alarms_of(
 
     With the ``observers`` of the bank each alarm carries the digest of its model.
     """
-    died = sorted((sample, name) for name, sample in record.died_at.items() if sample is not None)
+    return alarms_at(record, log.time, source, observers)
+
+
+def alarms_at(
+    outcome: BankRecord | Outcome,
+    times: Mapping[int, float] | Array,
+    source: Mapping[str, str | int | float],
+    observers: Mapping[str, Observer] | None = None,
+) -> tuple[Alarm, ...]:
+    """As `alarms_of`, where the ``times`` [s] of some samples are known: at least those of the falsifications."""
+    died = sorted((sample, name) for name, sample in outcome.died_at.items() if sample is not None)
     alarms = []
     for k, name in died:
-        proof = record.certificates[name]
+        proof = outcome.certificates[name]
         assert proof is not None  # banks take no falsification without one
         model = None if observers is None else digest_of_alarm(observers[name], proof)
-        alarms.append(Alarm(name, k, float(log.time[k]), proof, source, model))
+        alarms.append(Alarm(name, k, float(times[k]), proof, source, model))
     return tuple(alarms)
 
 

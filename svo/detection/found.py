@@ -1,25 +1,20 @@
-"""What a bank found in a log: what the command line prints of it, and writes."""
+"""What a bank found in a log, with what it said at each sample."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.signatures import options_by_name
-from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
+from svo.detection.findings import ChangeAt, Findings
 from svo.interval.on_log import ThresholdDetection
-from svo.isolation import Alarm, BankRecord, Verdict, write_alarms
+from svo.isolation import Alarm, BankRecord, Verdict
 from svo.logs.log import Log
 from svo.plant import MonitoredPlant
-from svo.plant.description import check_kept_description, keep_description
-from svo.store import write_text, write_whole
-from svo.terminal import line
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -27,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Detection:
+class Detection(Findings):
     """What a plant's bank found in a log; printed, it says what ``svo detect`` says.
 
     Attributes
@@ -61,25 +56,28 @@ class Detection:
         return self.record.verdict
 
     @property
+    def samples(self) -> int:
+        return len(self.log)
+
+    @property
     def detected_s(self) -> float | None:
-        """Time of the first falsification of the nominal model."""
         return self._at(self.record.detected_at)
 
     @property
     def isolated_s(self) -> float | None:
-        """First time at which exactly one fault was left."""
         return self._at(self.record.isolated_at)
 
     @property
-    def alive(self) -> tuple[str, ...]:
-        """Models that explain the data to the end."""
-        return self._alive(-1)
+    def fault(self) -> str | None:
+        return self.record.fault
 
     @property
-    def restarted(self) -> tuple[str, ...]:
-        """Models that were falsified, began again (`recovery` of the bank) and explain the data to the end."""
-        falsified = {alarm.observer for alarm in self.alarms}
-        return tuple(name for name in self.alive if name in falsified)
+    def undecided(self) -> int:
+        return int(self.record.undecided.sum())
+
+    @property
+    def stopped(self) -> int:
+        return int(self.record.stopped.sum())
 
     @options_by_name
     def plot(self, ax: Axes | None = None, *, channels: Sequence[str] | None = None) -> list[Artist]:
@@ -98,84 +96,12 @@ class Detection:
         """
         return self.record.plot(ax, channels=channels)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything but the certificates, for JSON; ``changes`` lists the verdict whenever it changed."""
-        record = self.record
-        return {
-            "plant": self.plant.name,
-            "noise": self.noise,
-            "samples": len(self.time),
-            "state": record.states[-1],
-            "detected_s": self.detected_s,
-            "isolated_s": self.isolated_s,
-            "fault": record.fault,
-            "alive": list(self.alive),
-            "restarted": list(self.restarted),
-            "falsified_s": {alarm.observer: alarm.time for alarm in self.alarms},
-            "undecided": int(record.undecided.sum()),
-            "stopped": int(record.stopped.sum()),
-            "changes": [
-                {"time_s": float(self.time[k]), "state": record.states[k], "alive": list(self._alive(k))}
-                for k in range(len(self.time))
-                if k == 0 or (record.states[k], self._alive(k)) != (record.states[k - 1], self._alive(k - 1))
-            ],
-        } | ({} if self.thresholds is None else {"interval_detector": self.thresholds.to_dict()})
-
-    def save(self, folder: str | Path) -> None:
-        """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be.
-
-        A plant's description is copied beside them, so that `svo.verify` finds the model that they are about.
-
-        Parameters
-        ----------
-        folder : path
-
-        Raises
-        ------
-        ValueError
-            If the folder holds results already, or another description; nothing is overwritten.
-        """
-        folder = Path(folder)
-        check_no_results(folder)
-        check_kept_description(self.plant, folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_whole(folder / ALARMS, lambda file: write_alarms(file, self.alarms))
-        write_text(folder / VERDICT, json.dumps(self.to_dict(), indent=2) + "\n")
-        keep_description(self.plant, folder)
-
-    def __str__(self) -> str:
-        return "\n".join(line(text) for text in self._lines())
-
-    def __repr__(self) -> str:
-        said = line(next(self._lines()))
-        return f"<Detection of {self.plant.name!r:.40}, {len(self.time)} samples: {said:.200}>"
-
-    def _lines(self) -> Iterator[str]:
-        yield from self._conclusion()
-        for alarm in self.alarms:
-            yield f"    {alarm.observer}: falsified at {alarm.time:g} s"
-        for name in self.alive:
-            again = ", begun again after it was falsified (recovery)" if name in self.restarted else ""
-            yield f"    {name}: explains the data to the end{again}"
-        if not self.alive:
-            yield f"No model explains the data from {max(alarm.time for alarm in self.alarms):g} s on."
-        undecided, stopped = int(self.record.undecided.sum()), int(self.record.stopped.sum())
-        if undecided:
-            yield f"    undecided answers: {undecided}"
-        if stopped:
-            yield f"    programs that ended at a limit, so that sets are wider: {stopped}"
-        if self.thresholds is not None:
-            yield self.thresholds.to_text()
-
-    def _conclusion(self) -> Iterator[str]:
-        if self.detected_s is None:
-            yield f"No fault: the nominal model explains all {len(self.time)} samples ({self.noise} noise)."
-            return
-        yield f"Fault detected at {self.detected_s:g} s: the nominal model is falsified ({self.noise} noise)."
-        if self.isolated_s is not None:
-            yield f"Fault isolated at {self.isolated_s:g} s: {self.record.fault}."
-        elif self.alive:
-            yield "Not isolated: more than one model explains the data."
+    @property
+    def changes(self) -> tuple[ChangeAt, ...]:
+        alive, states = self.record.alive, self.record.states
+        first = [0, *(np.flatnonzero((alive[1:] != alive[:-1]).any(axis=1)) + 1).tolist()]
+        said = sorted({*first, *(k for k in range(1, len(states)) if states[k] != states[k - 1])})
+        return tuple(ChangeAt(float(self.time[k]), states[k], self._alive(k)) for k in said)
 
     def _at(self, sample: int | None) -> float | None:
         return None if sample is None else float(self.time[sample])

@@ -4,7 +4,8 @@ from svo.isolation.alarms import Alarm, AlarmCheck, check_alarm, read_alarms, ve
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
 from svo.isolation.logic import GLOBAL, NOMINAL
-from svo.isolation.record import BankRecord, Recorder, Verdict
+from svo.isolation.record import BankRecord, Verdict
+from svo.isolation.recorder import Change, Outcome, Recorder
 
 __all__ = [
     "GLOBAL",
@@ -15,6 +16,8 @@ __all__ = [
     "ArchitectureII",
     "Bank",
     "BankRecord",
+    "Change",
+    "Outcome",
     "Recorder",
     "Verdict",
     "check_alarm",

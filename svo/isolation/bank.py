@@ -20,7 +20,8 @@ from svo.isolation.bank_checks import check_observers
 from svo.isolation.bank_state import BankState, Sample, restored, saved
 from svo.isolation.front import Front
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
-from svo.isolation.record import BankRecord, Recorder, Replay, Verdict
+from svo.isolation.record import BankRecord, Replay, Verdict
+from svo.isolation.recorder import Recorder
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models import Labels
@@ -250,13 +251,47 @@ class Bank(ABC):
             If the bank has already started, or the log is empty or has other channels than the models.
         """
         expect_log(log)
-        self._check_log(log)
+        self._check_log(log, 0)
         recorder = Recorder(self.names, log, Labels.of(self.observers[NOMINAL].model), Replay(self._boxes_of(log)))
-        for verdict, samples in self._follow(log):
+        for verdict, samples in self.follow(log):
             recorder.add(verdict, samples)
             if progress is not None:
                 progress(verdict.sample + 1, len(log))
         return recorder.record()
+
+    @options_by_name
+    def follow(self, log: Log, *, start: int = 0) -> Iterator[tuple[Verdict, int]]:
+        """The verdicts over a log, each with the samples that it is of: many where nothing changes.
+
+        A long log can be followed in portions, each with the last sample of the one before as its first. When all
+        verdicts of a portion are read, the bank is where `step` would have brought it.
+
+        Parameters
+        ----------
+        log : Log
+        start : int
+            First sample that the bank has not seen.
+
+        Raises
+        ------
+        ValueError
+            As `run`; if the bank has started where ``start`` is 0, or has not where it is more.
+        """
+        expect_log(log)
+        self._check_log(log, start)
+        if self._may_start_again:
+            yield from ((verdict, 1) for verdict in drive(self, log, start=start))
+            return
+        fronts = {name: Front(name, observer.follow(log, start=start)) for name, observer in self._running.items()}
+        k = start
+        while k < len(log):
+            running = [fronts[name] for name in self._running]
+            count = min((front.plain() for front in running), default=len(log) - k)
+            count = max(count, 1)
+            k += count
+            steps = {front.name: front.take(count) for front in running}
+            now = Sample.given(log.u[k - 2] if k > 1 else None, log.y[k - 1], log.u[k - 1], log.schedule_at(k - 1))
+            yield self._conclude((-1 if self._sample is None else self._sample) + count, steps, now), count
 
     def _boxes_of(self, log: Log) -> Callable[[], dict[str, tuple[Array, Array]]]:
         """What computes the boxes of a run from the present sample on, after it too."""
@@ -315,22 +350,6 @@ class Bank(ABC):
         return True
 
     # -- inside ------------------------------------------------------------------------------------
-
-    def _follow(self, log: Log) -> Iterator[tuple[Verdict, int]]:
-        """The verdicts over a log, each with the samples that it is of: many where nothing changes."""
-        if self._may_start_again:
-            yield from ((verdict, 1) for verdict in drive(self, log))
-            return
-        fronts = {name: Front(name, observer.follow(log)) for name, observer in self._running.items()}
-        k = 0
-        while k < len(log):
-            running = [fronts[name] for name in self._running]
-            count = min((front.plain() for front in running), default=len(log) - k)
-            count = max(count, 1)
-            k += count
-            steps = {front.name: front.take(count) for front in running}
-            now = Sample.given(log.u[k - 2] if k > 1 else None, log.y[k - 1], log.u[k - 1], log.schedule_at(k - 1))
-            yield self._conclude(k - 1, steps, now), count
 
     def _timed_steps(self, now: Sample, deadline: float) -> dict[str, Step]:
         if not (is_finite_number(deadline) and deadline > 0):
@@ -450,9 +469,11 @@ class Bank(ABC):
     def _nothing(self) -> ArrayLike:
         return np.full(self.observers[NOMINAL].model.n_outputs, np.nan)
 
-    def _check_log(self, log: Log) -> None:
-        if self._sample is not None:
+    def _check_log(self, log: Log, start: int) -> None:
+        if start == 0 and self._sample is not None:
             raise ValueError("run was called on a bank that has already started; call reset(set), or use a fresh bank")
+        if start > 0 and self._sample is None:
+            raise ValueError(f"start is {start}, but the bank has seen no sample; expected 0")
         model = self.observers[NOMINAL].model
         for name, wanted in (("u", model.n_inputs), ("y", model.n_outputs)):
             array: Array = getattr(log, name)

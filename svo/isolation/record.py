@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polytopes.signatures import options_by_name
 from svo.checks import Array, optional_import
-from svo.isolation.logic import GLOBAL, NOMINAL, StateName
+from svo.isolation.logic import NOMINAL, StateName
 from svo.logs.log import Log
 from svo.models import Labels
 from svo.observers.base import Certificate, Step
@@ -211,73 +211,3 @@ class Replay:
     def __getstate__(self) -> dict[str, Any]:
         # what would run again holds models, whose functions cannot always be pickled
         return {**self.__dict__, "_compute": None}
-
-
-class Recorder:
-    """Collects the verdicts of a run without keeping their steps."""
-
-    def __init__(self, names: tuple[str, ...], log: Log, labels: Labels, replay: Replay) -> None:
-        samples = len(log)
-        self._names, self._log, self._labels, self._replay = names, log, labels, replay
-        self._states: list[StateName] = []
-        self._alive = np.zeros((samples, len(names)), dtype=bool)
-        self._seconds = np.full((samples, len(names)), np.nan)
-        self._undecided = np.zeros((samples, len(names)), dtype=bool)
-        self._stopped = np.zeros((samples, len(names)), dtype=np.int64)
-        self._died_at: dict[str, int | None] = dict.fromkeys(names)
-        self._certificates: dict[str, Certificate | None] = dict.fromkeys(names)
-        self._detected_at: int | None = None
-        self._isolated_at: int | None = None
-        self._fault: str | None = None
-        self._global_seconds: NDArray[np.float64] | None = None
-        self._verdict: Verdict
-
-    def add(self, verdict: Verdict, samples: int = 1) -> None:
-        """The next sample; or the next ``samples``, of whose last the verdict is and at which nothing changed."""
-        k, self._verdict = verdict.sample, verdict
-        rows = slice(k + 1 - samples, k + 1)
-        self._states += [verdict.state] * samples
-        for i, name in enumerate(self._names):
-            step = verdict.steps.get(name)
-            self._alive[rows, i] = name in verdict.alive
-            if step is not None:
-                self._seconds[rows, i] = step.seconds
-                self._undecided[rows, i] = step.verdict == "undecided"
-                self._stopped[k, i] = step.stopped
-                if self._died_at[name] is None and not self._alive[k, i]:
-                    self._died_at[name], self._certificates[name] = k, step.certificate
-        if GLOBAL in verdict.steps:
-            self._add_global(verdict, verdict.steps[GLOBAL])
-        if self._detected_at is None:
-            self._detected_at = verdict.detected_at
-        if self._isolated_at is None:
-            self._isolated_at, self._fault = verdict.isolated_at, verdict.fault
-
-    def _add_global(self, verdict: Verdict, step: Step) -> None:
-        if self._global_seconds is None:
-            self._global_seconds = np.full(len(self._alive), np.nan)
-        self._global_seconds[verdict.sample] = step.seconds
-        declared = step.verdict == "falsified" and verdict.state == "unexplained"
-        if declared and GLOBAL not in self._died_at:
-            self._died_at[GLOBAL], self._certificates[GLOBAL] = verdict.sample, step.certificate
-
-    def record(self) -> BankRecord:
-        """Everything so far."""
-        return BankRecord(
-            names=self._names,
-            states=tuple(self._states),
-            alive=self._alive,
-            seconds=self._seconds,
-            undecided=self._undecided,
-            stopped=self._stopped,
-            died_at=self._died_at,
-            certificates=self._certificates,
-            detected_at=self._detected_at,
-            isolated_at=self._isolated_at,
-            fault=self._fault,
-            verdict=replace(self._verdict, steps={}),
-            log=self._log,
-            labels=self._labels,
-            replay=self._replay,
-            global_seconds=self._global_seconds,
-        )

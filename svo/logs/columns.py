@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -21,6 +22,7 @@ from svo.checks import Array
 from svo.logs.names import Column, Columns
 
 Place = Callable[[int], str]
+Note = Callable[[str], None]
 
 # Relative: a step is taken for Ts if |step - Ts| <= 0.01 Ts. The model then reckons with Ts: what the difference does
 # to the plant is for the user's bounds to hold, no set is widened by it.
@@ -29,6 +31,11 @@ TIME_TOLERANCE = 0.01
 
 class LogNote(UserWarning):
     """Something in a log that was read in a way its reader should know of; the command line prints it as a note."""
+
+
+def noted(text: str) -> None:
+    """A `LogNote` that is a warning."""
+    warnings.warn(text, LogNote, stacklevel=3)
 
 
 def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> list[str]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from svo.logs.columns import Array, may_be_missing, not_finite, not_there, wanted_columns
+from svo.logs.columns import Array, Note, may_be_missing, not_finite, not_there, noted, wanted_columns
 from svo.logs.lines import Lines
 from svo.logs.names import Columns
 from svo.logs.portions import Rows
@@ -33,23 +33,26 @@ def write_csv(path: Path, cells: Mapping[str, Array]) -> None:
             writer.writerow("" if math.isnan(value) else repr(value) for value in row)
 
 
-def read_csv(path: Path, columns: Columns, *, block: int = BLOCK, quick_from: int = BLOCK) -> Iterator[Rows]:
+def read_csv(
+    path: Path, columns: Columns, note: Note = noted, *, block: int = BLOCK, quick_from: int = BLOCK
+) -> Iterator[Rows]:
     """The rows of a log, a block of the file at a time; errors name the line and the column.
 
     A last line without its end is no sample: nobody can tell "2" from the beginning of "2.638". It is left out with a
-    `LogNote`.
+    note.
 
     Parameters
     ----------
     path : path
     columns : Columns
+    note : callable
     block : int
         Bytes to read at once.
     quick_from : int
         Bytes from which on a file is worth loading pyarrow for, if it is installed. What is read does not depend on it.
     """
     with path.open("rb") as file, csv_errors(str(path)):
-        lines = Lines(str(path), file, block)
+        lines = Lines(str(path), file, block, note)
         header = next((row for row in csv.reader(lines, **DIALECT) if row), [])
         parser = RowParser(str(path), header, columns)
         is_long = os.fstat(file.fileno()).st_size > quick_from

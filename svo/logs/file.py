@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from svo.checks import expect, is_finite_number
+from svo.logs.columns import Note, noted
 from svo.logs.csv import read_csv, write_csv
 from svo.logs.log import Log
 from svo.logs.mat import read_mat_log, write_mat
@@ -20,7 +21,7 @@ from svo.logs.portions import Rows, joined, portions_of
 
 
 class _Format(NamedTuple):
-    read: Callable[[Path, Columns], Iterator[Rows]]
+    read: Callable[[Path, Columns, Note], Iterator[Rows]]
     write: Callable[..., None]
 
 
@@ -73,16 +74,17 @@ def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
     return joined(list(read_portions(path, columns, Ts)))
 
 
-def read_portions(path: str | Path, columns: Columns, Ts: float) -> Iterator[Log]:
+def read_portions(path: str | Path, columns: Columns, Ts: float, note: Note = noted) -> Iterator[Log]:
     """A log in portions, one after the other, so that it need not be in memory as a whole; a MAT file is one portion.
 
-    Arguments and errors are those of `read_log`; an error comes when its portion is asked for.
+    Arguments and errors are those of `read_log`; an error comes when its portion is asked for. ``note`` is told of what
+    was read in a way that its reader should know of; by default that is a warning, `svo.logs.columns.LogNote`.
     """
     path = Path(path)
     expect(is_finite_number(Ts) and Ts > 0, "Ts", Ts, "a positive sampling time in seconds")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; expected a log file, one of {', '.join(_FORMATS)}")
-    rows = _format(path).read(path, columns)
+    rows = _format(path).read(path, columns, note)
     yield from (replace(portion, source=path.name) for portion in portions_of(str(path), rows, columns, Ts))
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator
 from typing import BinaryIO
 
-from svo.logs.columns import LogNote
+from svo.logs.columns import Note
 
 _MARK = b"\xef\xbb\xbf"
 _END = re.compile(rb"\r\n|\n|\r")
@@ -23,6 +22,8 @@ class Lines(Iterator[str]):
     file : binary file
     size : int
         Bytes to read at once. Only a line that is longer takes more.
+    note : callable
+        Told of a line that is left out.
 
     Attributes
     ----------
@@ -30,8 +31,8 @@ class Lines(Iterator[str]):
         Lines given so far.
     """
 
-    def __init__(self, source: str, file: BinaryIO, size: int) -> None:
-        self._source, self._file, self._size = source, file, size
+    def __init__(self, source: str, file: BinaryIO, size: int, note: Note) -> None:
+        self._source, self._file, self._size, self._note = source, file, size, note
         self._block, self._at = b"", 0
         self._left = b""  # read, but no whole line yet
         self._is_begun = self._is_over = False
@@ -77,7 +78,7 @@ class Lines(Iterator[str]):
         if self._is_over and self.number == 0:
             end = len(data)
         elif self._is_over and data.strip():
-            warnings.warn(f"{self._source}: {no_end(self.number + 1)}", LogNote, stacklevel=2)
+            self._note(f"{self._source}: {no_end(self.number + 1)}")
         self._block, self._left, self._at = bytes(data[:end]), bytes(data[end:]), 0
         if not self._block.isascii():
             self._block.decode()

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from svo.logs.columns import Array, check_cells, wanted_columns
+from svo.logs.columns import Array, Note, check_cells, noted, wanted_columns
 from svo.logs.mat_file import MatFile
 from svo.logs.names import Columns
 from svo.logs.portions import Rows, samples_from
@@ -36,7 +36,7 @@ def write_mat(path: Path, cells: Mapping[str, Array]) -> None:
     savemat(path, {name: values[:, None] for name, values in cells.items()}, appendmat=False)
 
 
-def read_mat_log(path: Path, columns: Columns) -> Iterator[Rows]:
+def read_mat_log(path: Path, columns: Columns, note: Note = noted) -> Iterator[Rows]:
     """The rows of a log, all at once; errors name the sample and the variable."""
     file = MatFile.open(path)
     needed = (columns.time, *(c.name for c in columns.inputs + columns.outputs))

@@ -9,7 +9,7 @@ from typing import Any
 
 from svo.checks import optional_import
 from svo.logs.arrow import numbers_of
-from svo.logs.columns import Array, check_cells, wanted_columns
+from svo.logs.columns import Array, Note, check_cells, noted, wanted_columns
 from svo.logs.names import Columns
 from svo.logs.portions import Rows, samples_from
 from svo.store.unpacking import check_unpacked
@@ -20,10 +20,10 @@ ROWS = 1 << 15
 def write_parquet(path: Path, cells: Mapping[str, Array]) -> None:
     """Write columns (K,) by name; NaN stays NaN."""
     arrow, parquet = _arrow()
-    parquet.write_table(arrow.table(dict(cells)), path, write_page_checksum=True)
+    parquet.write_table(arrow.table(dict(cells)), path, write_page_checksum=True, row_group_size=4 * ROWS)
 
 
-def read_parquet(path: Path, columns: Columns, *, rows: int = ROWS) -> Iterator[Rows]:
+def read_parquet(path: Path, columns: Columns, note: Note = noted, *, rows: int = ROWS) -> Iterator[Rows]:
     """The rows of a log, so many at a time; errors name the sample and the column."""
     arrow, parquet = _arrow()
     with path.open("rb") as file:

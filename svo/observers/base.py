@@ -217,7 +217,7 @@ class Observer(ABC):
         labels = Labels.of(self.model)
         return Record(tuple(verdicts), *bounds, np.array(seconds), step.certificate, log, labels, stopped)
 
-    def follow(self, log: Log, boxes: Array | None = None) -> Iterator[Seen]:
+    def follow(self, log: Log, boxes: Array | None = None, *, start: int = 0) -> Iterator[Seen]:
         """The samples of a log as they are seen: one after the other, or many consistent ones at once.
 
         Who has seen enough stops asking. An observer that takes many samples at once has then seen more of the log.
@@ -227,13 +227,16 @@ class Observer(ABC):
         log : Log
         boxes : (K, 2, n) array, optional
             Filled with lower and upper bounds of the state at each sample, which are computed only then.
+        start : int
+            First sample that it has not seen. A long log can be followed in portions, each with the last sample of the
+            one before as its first.
 
         Raises
         ------
         TypeError, ValueError
             As `run`.
         """
-        for k, step in enumerate(drive(self, log)):
+        for k, step in enumerate(drive(self, log, start=start), start=start):
             if boxes is not None:
                 boxes[k] = step.box  # it is that of the newest sample only
             yield Seen(1, step)

@@ -6,7 +6,6 @@ from typing import Protocol, runtime_checkable
 
 from svo.checks import Array
 from svo.logs.dialect.rules import Dialect
-from svo.logs.log import Log
 from svo.plant.protocol import MonitoredPlant
 
 
@@ -29,7 +28,16 @@ def dialect_of(plant: MonitoredPlant) -> Dialect | None:
     return plant.dialect if isinstance(plant, StatesDialect) else None
 
 
-def on_log(plant: MonitoredPlant, log: Log) -> MonitoredPlant:
+class Widened(Protocol):
+    """A log, in memory or not."""
+
+    @property
+    def widening(self) -> Array | None:
+        """What its readings are less exact than the model's, (ny,)."""
+        ...
+
+
+def on_log(plant: MonitoredPlant, log: Widened) -> MonitoredPlant:
     """The plant whose bounds hold on a log: with the widening that reading the log cost.
 
     Raises

@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from svo.logs import file
 from svo.logs.columns import LogNote
@@ -48,7 +49,22 @@ def read_log(path: str | Path, plant: MonitoredPlant) -> Log:
     """
     expect_plant(plant)
     log = _read(path, plant)
-    silent = [column.name for column, y in zip(plant.columns.outputs, log.y.T, strict=True) if np.isnan(y).all()]
+    check_measured(path, plant, np.isnan(log.y).sum(axis=0), len(log))
+    return log
+
+
+def check_measured(path: str | Path, plant: MonitoredPlant, missing: NDArray[np.int64], samples: int) -> None:
+    """Note the sensors that never measure anything; one that does has to be there.
+
+    Parameters
+    ----------
+    path : path
+    plant : MonitoredPlant
+    missing : (ny,) array of int
+        Samples without a measurement of each sensor.
+    samples : int
+    """
+    silent = [c.name for c, without in zip(plant.columns.outputs, missing, strict=True) if without == samples]
     if len(silent) == len(plant.columns.outputs):
         raise ValueError(
             f"{path} has no measurement: {', '.join(map(repr, silent))} empty in every row; expected numbers in one of "
@@ -56,8 +72,7 @@ def read_log(path: str | Path, plant: MonitoredPlant) -> Log:
         )
     for name in silent:
         said = f"{path} has no measurement of {name!r}; nothing is concluded from that sensor"
-        warnings.warn(said, LogNote, stacklevel=2)
-    return log
+        warnings.warn(said, LogNote, stacklevel=3)
 
 
 def _read(path: str | Path, plant: MonitoredPlant) -> Log:

@@ -32,7 +32,12 @@ def schedule_of(scheduler: Scheduler, y: NDArray[np.float64], u: NDArray[np.floa
 
 def scheduled(scheduler: Scheduler, log: Log) -> Log:
     """A ``log`` with the schedule that a fresh ``scheduler`` makes of its y and u."""
-    values = [schedule_of(scheduler, y, u) for y, u in zip(log.y, log.u, strict=True)]
+    if scheduler is no_schedule:
+        return replace(log, schedule=None)
+    if isinstance(scheduler, InputScheduler):
+        values = [scheduler.with_input(y, u) for y, u in zip(log.y, log.u, strict=True)]
+    else:
+        values = [scheduler(y) for y in log.y]
     return replace(log, schedule=None if values[0] is None else real_array("schedule", values, finite=False))
 
 

@@ -263,13 +263,15 @@ class WindowObserver(Observer):
 
     # -- many samples at once ---------------------------------------------------------------------
 
-    def follow(self, log: Log, boxes: Array | None = None) -> Iterator[Seen]:
+    def follow(self, log: Log, boxes: Array | None = None, *, start: int = 0) -> Iterator[Seen]:
         expect_log(log)
-        k, portion = 0, 1
+        k, portion = start, 1
+        before = self._number + 1 - start if start else 0  # samples that are not in this log
         while k < len(log):
             check_rounding()
             begun = perf_counter()
-            samples = self._samples_at_once(log, k, portion)
+            in_step = self._number + 1 == before + k
+            samples = self._samples_at_once(log, k, portion) if in_step else None
             if samples is None:
                 answers = [self._seen_alone(advance_to(self, log, k, log.schedule_at(k)), k, boxes)]
             else:
@@ -282,7 +284,7 @@ class WindowObserver(Observer):
     def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | None:
         """Samples of a log for one call of the kernel; None where the next one needs more than that."""
         gone = self._lost or self._alarm is not None or self._readings is not None or self._missing.any()
-        if gone or self._number != first - 1:
+        if gone:
             return None
         last = min(first + min(count, self._window.takes_at_once), len(log))
         return log_samples(self._form, log, first, last, self._wants_next_input)
@@ -296,7 +298,7 @@ class WindowObserver(Observer):
             own[:done] *= self._form.x
         if done:
             self._number += done
-            self._schedule = log.schedule_at(self._number)
+            self._schedule = log.schedule_at(first + done - 1)
             step = self._answered(WindowStep(self, verdict="consistent"), begun, stopped)
             yield Seen(done, replace(step, seconds=step.seconds / done))
         at = first + done

@@ -114,6 +114,11 @@ class DescribedPlant:
         faults = {name: replace(fault, model=_wider(fault.model, widening)) for name, fault in self.faults.items()}
         return replace(self, model=_wider(self.model, widening), faults=faults)
 
+    @property
+    def has_thresholds(self) -> bool:
+        """Whether an interval detector runs beside the bank."""
+        return self.interval is not None
+
     def detect_thresholds(self, log: Log) -> ThresholdDetection | None:
         """What the interval detector says about a log; None if there is none in the file."""
         if self.interval is None:
