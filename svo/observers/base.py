@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from polytopes.rounding import check_rounding
+from polytopes.signatures import options_by_name
 from svo.checks import Array, is_count
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
@@ -217,6 +218,7 @@ class Observer(ABC):
         labels = Labels.of(self.model)
         return Record(tuple(verdicts), *bounds, np.array(seconds), step.certificate, log, labels, stopped)
 
+    @options_by_name
     def follow(self, log: Log, boxes: Array | None = None, *, start: int = 0) -> Iterator[Seen]:
         """The samples of a log as they are seen: one after the other, or many consistent ones at once.
 

@@ -263,6 +263,7 @@ class WindowObserver(Observer):
 
     # -- many samples at once ---------------------------------------------------------------------
 
+    @options_by_name
     def follow(self, log: Log, boxes: Array | None = None, *, start: int = 0) -> Iterator[Seen]:
         expect_log(log)
         k, portion = start, 1
