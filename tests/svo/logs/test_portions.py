@@ -55,7 +55,13 @@ def at_once(path: Path) -> Log:
             stacklevel=1,
         )
     reader = csv.reader(io.StringIO(data[:end].decode(), newline=""), strict=True, skipinitialspace=True)
-    rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if row]
+    rows, is_cut = [], False
+    try:
+        for row in reader:
+            if row:
+                rows.append((reader.line_num, [cell.strip() for cell in row]))
+    except csv.Error:
+        is_cut = True
     names, before = rows[0][1], None
     time, u, y = [], [], []
     for line, cells in rows[1:]:
@@ -69,6 +75,8 @@ def at_once(path: Path) -> Log:
         time.append(before)
         u.append(values[1:2])
         y.append(values[2:])
+    if is_cut:
+        raise ValueError("not a CSV text file")
     if not time:
         raise ValueError("has a header but no samples")
     return Log(np.array(time), np.array(u), np.array(y))
