@@ -114,6 +114,8 @@ def tasks() -> Iterator[tuple[str, Callable[[], Turn]]]:
         yield f"100 supports ({n}, {m}), each", lambda n=n, m=m: supports(n, m, 100)  # type: ignore[misc]
         yield f"one support ({n}, {m})", lambda n=n, m=m: supports(n, m, 1)  # type: ignore[misc]
         yield f"emptiness ({n}, {m})", lambda n=n, m=m: emptiness(n, m)  # type: ignore[misc]
+    for question in ("emptiness", "support", "bounding_box", "is_bounded"):
+        yield f"a new box in R^4, {question}", lambda question=question: asked(question)  # type: ignore[misc]
     for n, m in ((2, 500), (2, 5000), (3, 500), (3, 4000), (4, 200), (4, 2000), (5, 800), (6, 200), (8, 200)):
         yield f"redundancy ({n}, {m})", lambda n=n, m=m: redundancy(random_polytope(n, m))  # type: ignore[misc]
         if m <= 2000:
@@ -129,6 +131,21 @@ def supports(n: int, m: int, count: int) -> Turn:
     P, directions = random_polytope(n, m), np.random.default_rng(1).standard_normal((count, n))
     P.emptiness()
     return repeated(lambda: P.support(directions), count)
+
+
+def asked(question: str) -> Turn:
+    """A question to boxes that have not been asked before; their construction does not count."""
+    corner = np.ones(4)
+    arguments = (corner,) if question == "support" else ()
+
+    def turn() -> float:
+        boxes = [HPolytope.box(-corner, corner) for _ in range(100)]
+        begun = process_time()
+        for box in boxes:
+            getattr(box, question)(*arguments)
+        return 1e6 * (process_time() - begun) / len(boxes)
+
+    return turn
 
 
 def emptiness(n: int, m: int) -> Turn:

@@ -6,13 +6,13 @@ coefficients are, and no tolerance takes a dependent row for an independent one.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
 from polytopes.checks import Floats
+from polytopes.derived import derived
 from polytopes.exact import (
     ZERO,
     Multipliers,
@@ -49,7 +49,7 @@ class AffineSet:
     solved: fmpq_mat
     contradiction: Multipliers | None
 
-    @cached_property
+    @derived
     def point(self) -> Floats:
         """A solution (n,): the one with free coordinates zero."""
         point = np.zeros(self.dim)
@@ -57,7 +57,7 @@ class AffineSet:
             point[self.pivots] = to_floats(self.solved[k, len(self.free)] for k in range(len(self.pivots)))
         return point
 
-    @cached_property
+    @derived
     def basis(self) -> Floats:
         """Directions of the set, array (n, number of free coordinates)."""
         basis = np.zeros((self.dim, len(self.free)))
@@ -109,7 +109,7 @@ class AffineSet:
             errors[exact_sums(A, b, solution, reach)] = 0.0
         return errors[:, :-1], errors[:, -1]
 
-    @cached_property
+    @derived
     def _rounded(self) -> bool:
         """Whether an entry of the basis or the point is not exactly what it stands for."""
         free = len(self.free)

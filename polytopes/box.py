@@ -9,26 +9,27 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from polytopes.checks import Floats
-from polytopes.native import Entries, Given, Integer, function
+from polytopes.native import Address, Entries, Integer, function
 from polytopes.rounding import check_rounding
 
-_box = function("fdi_box", *[Integer] * 2, *[Given] * 2, Entries, returns=Integer)
-_supports = function("fdi_box_supports", *[Integer] * 2, *[Given] * 2, Entries, returns=Integer)
+_box = function("fdi_box", *[Integer] * 2, *[Address] * 2, Entries, returns=Integer)
+_supports = function("fdi_box_supports", *[Integer] * 2, *[Address] * 2, Entries, returns=Integer)
 
 
 class Box(NamedTuple):
-    """A box that is not empty.
+    """A box that is not empty: its corners and its point are the first rows of an array."""
 
-    Attributes
-    ----------
-    corners : array (2, n)
-        Lower and upper, rounded outward; infinite where there is no row.
-    point : array (n,)
-        Satisfies every row exactly.
-    """
+    found: Floats
 
-    corners: Floats
-    point: Floats
+    @property
+    def corners(self) -> Floats:
+        """Lower and upper (2, n), rounded outward; infinite where there is no row."""
+        return self.found[:2]
+
+    @property
+    def point(self) -> Floats:
+        """A point (n,) that satisfies every row exactly."""
+        return self.found[2]
 
     @classmethod
     def of(cls, A: Floats, b: Floats, C: Floats) -> Self | None:
@@ -37,16 +38,16 @@ class Box(NamedTuple):
         m, n = A.shape
         if len(C) or np.count_nonzero(A) > m:
             return None
-        bounds = np.empty((5, n))
-        return cls(bounds[:2], bounds[2]) if _box(m, n, A, b, bounds) else None
+        found = np.empty((5, n))
+        return cls(found) if _box(m, n, A.tobytes(), b.tobytes(), found) else None
 
     @property
     def bounded(self) -> bool:
-        return np.count_nonzero(np.isfinite(self.corners)) == self.corners.size
+        return np.count_nonzero(np.isfinite(self.corners)) == 2 * self.point.size
 
     def supports(self, directions: Floats) -> Floats | None:
         """Upper bounds (k,) of the supports along directions (k, n); None if the numbers are of too different sizes."""
         check_rounding()
         k, n = directions.shape
         values = np.empty(k)
-        return values if _supports(n, k, self.corners, directions, values) else None
+        return values if _supports(n, k, self.found.tobytes(), directions.tobytes(), values) else None

@@ -185,8 +185,9 @@ def _check_kind(name: str, raw: NDArray[Any], value: Any) -> None:
 def _check_shape(name: str, array: Floats, shapes: Sequence[Shape], meaning: str) -> None:
     if not shapes:
         return
-    if any(len(array.shape) == len(shape) and all(map(_fits, array.shape, shape)) for shape in shapes):
-        return
+    for shape in shapes:
+        if len(shape) == array.ndim and all(map(_fits, array.shape, shape)):
+            return
     wanted = " or ".join(_shape_text(shape) for shape in shapes)
     raise ValueError(f"{name} has shape {array.shape}; expected {wanted}{', ' if meaning else ''}{meaning}.")
 

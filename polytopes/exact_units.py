@@ -1,7 +1,6 @@
 """The rows of a program in even units for the rational simplex: it pivots alike whatever the units of the user are."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from polytopes.affine import AffineSet
 from polytopes.checks import Floats
+from polytopes.derived import derived
 from polytopes.exact import power_of_two, to_floats
 from polytopes.exact_simplex import ExactOutcome, affordable, exact_feasibility, exact_maximum
 
@@ -40,7 +40,7 @@ class EvenRows:
         """Some of the rows."""
         return replace(self, A=self.A[chosen], b=self.b[chosen], rows=self.rows[chosen])
 
-    @cached_property
+    @derived
     def _even(self) -> tuple[Floats, Floats, AffineSet]:
         A = np.ldexp(self.A, self.rows[:, None] + self.columns)
         return A, np.ldexp(self.b, self.rows), self.flat.in_units(self.columns)

@@ -70,7 +70,9 @@ class HPolytope(Rows):
             raise ValueError("lower is +inf or upper is -inf somewhere; expected -inf, +inf or a finite bound.")
         axes = np.eye(low.size)
         above, below = np.isfinite(high), np.isfinite(low)
-        return cls(np.vstack([axes[above], -axes[below]]), np.concatenate([high[above], -low[below]]))
+        box = cls(np.vstack([axes[above], -axes[below]]), np.concatenate([high[above], -low[below]]))
+        _ = box.as_box  # at once: no question to it then has to look at its rows
+        return box
 
     @classmethod
     def from_vertices(cls, V: ArrayLike, rays: ArrayLike | None = None) -> Self:

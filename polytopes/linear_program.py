@@ -9,7 +9,6 @@ rounded; what none of them settles is reported as undecided, never guessed.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from flint import fmpq
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from polytopes import kernel
 from polytopes.affine import AffineSet, affine_set
 from polytopes.checks import Floats
+from polytopes.derived import derived
 from polytopes.duality import Bounds, multiplier_bounds, proved_reach
 from polytopes.exact import rounded_up, to_floats
 from polytopes.exact_units import EvenRows, weights_of
@@ -139,16 +139,16 @@ class Program:
         """Whether neither the equalities nor a constant row are contradictory by themselves."""
         return self.flat.contradiction is None and self.violated is None
 
-    @cached_property
+    @derived
     def size(self) -> float:
         """The size that tolerances refer to: the largest entry of the scaled b, or 1."""
         return float(np.abs(self.rhs).max(initial=0.0)) or 1.0
 
-    @cached_property
+    @derived
     def _small(self) -> bool:
         return self.AT.shape[0] <= _KERNEL_VARIABLES and self.AT.size <= _KERNEL_ENTRIES
 
-    @cached_property
+    @derived
     def _highs(self) -> HighsProgram:
         return HighsProgram(np.ascontiguousarray(self.AT.T), self.rhs)
 
@@ -156,7 +156,7 @@ class Program:
         """Points (..., free) in the units of the program as points (..., n) of the user."""
         return self.flat.lift(np.ldexp(z, self.powers))
 
-    @cached_property
+    @derived
     def interior(self) -> Interior:
         """Centre and radius of a largest ball within the affine set; the program must be consistent."""
         free, kept = self.AT.shape
@@ -179,13 +179,13 @@ class Program:
         z = point[:-1].copy()
         return Interior(self.lift(z), z, radius, np.maximum(weights, 0.0), answer.status == "optimal")
 
-    @cached_property
+    @derived
     def thin(self) -> bool:
         """Whether the set is so thin (or so nearly empty) that only exact arithmetic can say that it has a point."""
         interior = self.interior
         return self.AT.shape[0] == 0 or not interior.reliable or interior.radius <= _THIN * self.size
 
-    @cached_property
+    @derived
     def fat(self) -> bool:
         """Whether a ball fits in, within the affine set, that floats vouch for."""
         return self.consistent and not self.thin and self.interior.radius > 0.0
@@ -195,7 +195,7 @@ class Program:
         """The centre of a largest ball in the coordinates of AT."""
         return self.interior.centre
 
-    @cached_property
+    @derived
     def balanced(self) -> "Program":
         """The same program in coordinates in which the set is about as wide along each axis, by powers of two.
 
@@ -323,13 +323,13 @@ class Program:
                 found.status[q] = UNDECIDED
         return values
 
-    @cached_property
+    @derived
     def errors(self) -> tuple[Floats, Floats]:
         """What the elimination of equalities rounded: bounds (kept, free) and (kept,) for the entries of AT and rhs."""
         of_rows, of_rhs = self.flat.restriction_errors(self.A[self.kept], self.b[self.kept])
         return np.ldexp(of_rows, self.row_powers[:, None] + self.powers), np.ldexp(of_rhs, self.row_powers)
 
-    @cached_property
+    @derived
     def _reach(self) -> Floats:
         """Bounds (free,) of the coordinates of all points of the set; inf where none is proved."""
         bounds = self._along_axes.bounds
@@ -341,12 +341,12 @@ class Program:
         values = np.where(solved, 2.0 * bounds.values, np.inf)
         return proved_reach(Bounds(values, bounds.spare, 2.0 * bounds.beside))
 
-    @cached_property
+    @derived
     def _axes(self) -> Floats:
         half = 0.5 * np.eye(self.powers.size)  # as forms are scaled
         return np.vstack([half, -half])
 
-    @cached_property
+    @derived
     def _along_axes(self) -> _Solved:
         if self._small:
             return self._by_kernel(self._axes)
@@ -389,7 +389,7 @@ class Program:
         )
         return answer.point, refined, multiplier_bounds(self.AT, self.rhs, reduced, refined), OPTIMAL
 
-    @cached_property
+    @derived
     def _exact_point(self) -> list[fmpq] | None:
         """A point that satisfies every row exactly; None if the rational simplex is not affordable or did not end."""
         if not self.exact.affordable:

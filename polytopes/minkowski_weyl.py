@@ -6,12 +6,12 @@ generators of both.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from flint import fmpz_mat
 from numpy.typing import NDArray
 
+from polytopes.derived import derived
 from polytopes.double_description import MAX_RAYS, Integers, cone_generators, primitive
 
 _TINY = float(np.finfo(np.float64).tiny)
@@ -46,7 +46,7 @@ class ExactGenerators:
         """Dimension of the affine hull, -1 for the empty set."""
         return homogeneous_rank(self) - 1
 
-    @cached_property
+    @derived
     def points(self) -> NDArray[np.float64]:
         """The vertices (k, n), each coordinate to the nearest float; NaN where that is not within half an ulp."""
         points = [[_nearest(v, row[-1]) for v in row[:-1]] for row in self.vertices.tolist()]

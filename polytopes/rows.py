@@ -1,7 +1,6 @@
 """The rows of an H-polytope: validated once, read-only, with what is derived from them kept beside them."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from polytopes.box import Box
 from polytopes.checks import Floats, real_array
+from polytopes.derived import derived
 from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
 from polytopes.linear_program import Program, prepare
@@ -62,29 +62,29 @@ class Rows(Value):
         """Dimension n of the space."""
         return int(self.A.shape[1])
 
-    @cached_property
+    @derived
     def program(self) -> Program:
         """The rows prepared for linear programs."""
         return prepare(self.A, self.b, self.C, self.d)
 
-    @cached_property
+    @derived
     def as_box(self) -> Box | None:
         """The rows as a box, if they are one that is not empty."""
         return Box.of(self.A, self.b, self.C)
 
-    @cached_property
+    @derived
     def decided(self) -> Emptiness:
         """Emptiness of the rows, decided once."""
         if self.as_box is not None:
             return Emptiness("nonempty", self.as_box.point, None, "a point between the bounds of a box")
         return decide_emptiness(self, self.program)
 
-    @cached_property
+    @derived
     def wide(self) -> bool:
         """Whether floats know the nonempty set well: full-dimensional, wide against their rounding, bounded."""
         return wide(self.program)
 
-    @cached_property
+    @derived
     def exact(self) -> ExactGenerators | None:
         """The generators in integers, where the set is computed with in integers; see `exact_generators`."""
         return exact_generators(self.A, self.b, self.C, self.d, self.program)

@@ -34,7 +34,9 @@ def callables() -> dict[str, tuple[Callable[..., Any], str]]:
         if not issubclass(item, BaseException) and not getattr(item, "_is_protocol", False):
             found[name] = item, own + (item.__init__.__doc__ or "")
         for method, value in inspect.getmembers(item, inspect.isroutine):
-            if not method.startswith("_") and getattr(value, "__module__", "").split(".")[0] in ("svo", "polytopes"):
+            if method.startswith("_") or not callable(value):
+                continue
+            if getattr(value, "__module__", "").split(".")[0] in ("svo", "polytopes"):
                 found[f"{name}.{method}"] = value, inspect.getdoc(value) or ""
     return found
 
