@@ -17,9 +17,9 @@ from tests.house.imports import (
 )
 
 ORDER = (
-    "polytopes", "checks", "indices", "terminal", "store", "pictures", "logs", "models", "faults", "observers",
-    "interval", "residual_tests", "baselines", "isolation", "detectors", "plant", "analysis", "detection", "studies",
-    "testing", "cli",
+    "polytopes", "checks", "indices", "terminal", "store", "pictures", "logs", "functions", "models", "faults",
+    "observers", "interval", "residual_tests", "baselines", "isolation", "detectors", "plant", "analysis", "detection",
+    "studies", "testing", "cli",
 )  # fmt: skip
 CLOSED_TO_PLANTS = {"analysis", "detection", "studies", "testing", "cli"}
 
