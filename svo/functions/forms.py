@@ -165,18 +165,14 @@ class Box(NamedTuple):
 
     def chosen(self, t: Form, below: Form | None, above: Form | None) -> Form:
         """One form where t is below zero, the other elsewhere; where t may be both, either."""
-        low, high = t.range
-        form = below if high < 0.0 else above
-        if low < 0.0 <= high:
-            if below is None or above is None:
-                raise NotEnclosed("one of its pieces has no bounded range")
-            gap = self.difference(below, above).range
-            share = 0.5 * max(abs(gap[0]), abs(gap[1]))
-            both = applied(Op.SELECT, t.range, below.range, above.range)
-            return self.sloped(self.total(below, above), 0.5, (-share, share), both)
-        if form is None:
-            raise NotEnclosed("the piece that holds has no bounded range")
-        return form
+        both = applied(Op.SELECT, t.range, below and below.range, above and above.range)
+        if below is None or above is None or not t.range[0] < 0.0 <= t.range[1]:
+            form = below if t.range[1] < 0.0 else above
+            assert form is not None  # `applied` has refused what it needs and is not there
+            return form
+        gap = self.difference(below, above).range
+        share = 0.5 * max(abs(gap[0]), abs(gap[1]))
+        return self.sloped(self.total(below, above), 0.5, (-share, share), both)
 
     def angle(self, y: Form, x: Form) -> Form:
         """atan2(y, x), by one-sided bounds of second order; its range alone where that is narrower, or at the cut."""

@@ -179,11 +179,13 @@ def atan2(y: Interval, x: Interval) -> Interval:
     return min(map(ball_below, corners)), max(map(ball_up, corners))
 
 
-def select(t: Interval, below: Interval, above: Interval) -> Interval:
-    """The second where the first is below zero, else the third."""
-    if t[1] < 0.0:
-        return below
-    return above if t[0] >= 0.0 else (min(below[0], above[0]), max(below[1], above[1]))
+def select(t: Interval, below: Interval | None, above: Interval | None) -> Interval:
+    """The second where the first is below zero, else the third; None is a piece without a bounded range."""
+    pieces = [piece for piece, may_hold in ((below, t[0] < 0.0), (above, t[1] >= 0.0)) if may_hold]
+    if None in pieces:
+        raise NotEnclosed("a piece that may hold has no bounded range")
+    ends = [end for piece in pieces if piece is not None for end in piece]
+    return min(ends), max(ends)
 
 
 def ball_below(value: arb) -> float:
@@ -198,8 +200,8 @@ OPERATIONS: Mapping[Op, Callable[..., Interval]] = {
 }  # fmt: skip
 
 
-def applied(op: Op, *operands: Interval) -> Interval:
-    """The range of an operation.
+def applied(op: Op, *operands: Interval | None) -> Interval:
+    """The range of an operation; of a piece that has none, None.
 
     Raises
     ------

@@ -126,5 +126,6 @@ def _constant(node: ast.expr) -> float | None:
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         value = _constant(node.operand)
         return None if value is None else -value
-    value = node.value if isinstance(node, ast.Constant) else None
-    return float(value) if type(value) in (int, float) and abs(value) < 1e300 else None  # type: ignore[arg-type]
+    number = node.value if isinstance(node, ast.Constant) else None
+    plain = isinstance(number, int | float) and not isinstance(number, bool) and abs(number) < 1e300
+    return float(number) if plain else None  # type: ignore[arg-type]

@@ -8,8 +8,8 @@ from importlib import import_module
 from typing import Any
 
 FACES = (
-    "polytopes", "svo", "svo.plant", "svo.interval", "svo.faults", "svo.indices", "svo.residual_tests", "svo.baselines", "svo.functions",
-    "svo.testing",
+    "polytopes", "svo", "svo.plant", "svo.interval", "svo.faults", "svo.indices", "svo.residual_tests", "svo.baselines",
+    "svo.functions", "svo.testing",
 )  # fmt: skip
 
 

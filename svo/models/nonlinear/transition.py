@@ -53,21 +53,19 @@ def transition(flow: Flow, start: Span, u: Array, T: float, least: int = 1) -> T
     n, nw = flow.n, len(flow.varying)
     start = flow.inside(start)
     here = Transition(np.eye(n), np.zeros(n), np.zeros((n, nw)), np.zeros(n), start, 0)
-    done, size = 0, _FINEST // least
+    done, size, why = 0, _FINEST // least, "the state moves too far for a linear model"
     while done < _FINEST:
         h = T * (size / _FINEST)  # exact: a power of two
         try:
             box, forms = flow.enclosure(here.box, u, h)
             is_short = _scaled_norm(forms.g[:, :n], box, h) <= 1.0
-        except Undecided:
-            if size == 1:
-                raise
-            is_short = False
+        except Undecided as error:
+            is_short, why = False, str(error)
         if is_short:
             flow.check_valid(box)
             here, done = _after(flow, here, start, box, forms, h), done + size
         elif size == 1 or (_FINEST - done) // size > _MOST:
-            raise Undecided(f"more than {_MOST} substeps would be needed; expected a shorter sample or a smaller set")
+            raise Undecided(f"more than {_MOST} substeps would be needed: {why}")
         else:
             size //= 2
     return here

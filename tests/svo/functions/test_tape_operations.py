@@ -74,10 +74,12 @@ def test_a_product_keeps_the_sign_of_its_squares() -> None:
 
 def test_a_piece_need_be_defined_only_where_it_holds() -> None:
     tape = traced(lambda z: [F.piecewise(z[0], [0.0], [F.sqrt(-z[0]), F.log(z[0] + 1.0)])], 1)
-    assert over(tape, [1.0], [2.0]).upper[0] == pytest.approx(np.log(3.0))
-    assert over(tape, [-4.0], [-1.0]).upper[0] == pytest.approx(2.0)
-    with pytest.raises(Unenclosed, match="in sqrt: its argument may be negative"):
-        over(tape, [-1.0], [1.0])
+    for lower, upper, most in ((1.0, 2.0, np.log(3.0)), (-4.0, -1.0, 2.0)):
+        assert over(tape, [lower], [upper]).upper[0] == pytest.approx(most)
+        assert tape.ranges(np.array([lower]), np.array([upper]))[1][0] == pytest.approx(most)
+    for evaluate in (over, lambda tape, *ends: tape.ranges(*map(np.array, ends))):
+        with pytest.raises(Unenclosed, match="in sqrt: its argument may be negative"):
+            evaluate(tape, [-1.0], [1.0])
 
 
 def test_pieces_over_a_jump_hold_both() -> None:

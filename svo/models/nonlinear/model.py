@@ -1,0 +1,316 @@
+"""Nonlinear plants from their equations: dx/dt = f(x, u, w, p), y = h(x, u, w, p) + v."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes.signatures import options_by_name
+from svo.checks import Array, expect, expect_kind, expect_shape, finite_array, is_count, positive_number, sizes
+from svo.functions.tape import Tape
+from svo.logs.log import Log
+from svo.models.nonlinear.carrier import carrier_of
+from svo.models.nonlinear.flow import Flow, Span, Undecided
+from svo.models.nonlinear.output import LinearOutput, linear_output
+from svo.models.nonlinear.simulation import simulated
+from svo.models.nonlinear.tracing import Function, Sizes, traced
+from svo.models.nonlinear.transition import Transition, mapped, transition
+from svo.models.state_range import StateRange, start_range, state_range
+
+_WORTH_ANOTHER = 0.1  # of the width of the set: a remainder beyond it is worth a second substep
+
+
+@options_by_name
+@dataclass(frozen=True, eq=False)
+class NonlinearModel:
+    """A plant dx/dt = f(x, u, w, p), y = h(x, u, w, p) + v, |v| <= n, taken by `WindowObserver`.
+
+    f and h are traced once. At each sample the observer linearises the plant over the set that it knows, with a bound
+    of what that leaves out which holds for every state of the set, every w and every p: see `docs/nonlinear.md`.
+
+    Parameters
+    ----------
+    f, h : functions of vectors
+        Built of ``+ - * / **`` and `svo.functions`; each returns a list of rows. Arguments named u, w and p are inputs,
+        disturbances and parameters; one more, by any name, is the state. They may have those that they need, in any
+        order.
+    states : sequence of str
+        Names, one a row of f.
+    inputs, disturbances : sequence of str
+        Names. Inputs are known, and constant from one sample to the next.
+    outputs : sequence of str, optional
+        Names, one a row of h.
+    parameters : mapping from names to (lower, upper)
+        Unknown numbers p, free at each sample within their bounds.
+    Ts : float
+        Sampling time [s].
+    n : (ny,) array or float
+        Half-width of the sensors' noise.
+    w : (lower, upper), or a half-width vector (nw,)
+        Bounds of the disturbances.
+    varying : str or sequence of str
+        Disturbances and parameters that may change inside a sample: their names, "w" (all disturbances), "p" (all
+        parameters) or "all". The others are held from sample to sample.
+    physical : (lower, upper), optional
+        The state never leaves this range: a promise about the plant at all times; -inf or inf where there is none.
+    valid : (lower, upper), optional
+        Where the equations hold. Where the state may leave it, the set starts again from ``largest``, and the verdict
+        is "undecided".
+    largest : (lower, upper), optional
+        Bounded; holds the state where a set starts again. By default ``physical``, which then must be bounded.
+    continuous : bool
+        False for equations in discrete time, x(k+1) = f(x(k), u(k), w(k), p(k)).
+
+    Attributes
+    ----------
+    physical_range, valid_range, start_range : StateRange or None
+        ``physical``, ``valid``, and ``largest`` within ``physical``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the argument or the row of f or h, what it is, and what was expected.
+    """
+
+    f: Function
+    h: Function
+    _: KW_ONLY
+    states: Sequence[str]
+    inputs: Sequence[str] = ()
+    outputs: Sequence[str] | None = None
+    disturbances: Sequence[str] = ()
+    parameters: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    Ts: float = 1.0
+    n: Any = 0.0
+    w: Any = None
+    varying: str | Sequence[str] = ()
+    physical: Any = None
+    valid: Any = None
+    largest: Any = None
+    continuous: bool = True
+    flow: Flow = field(init=False, repr=False)
+    reading: Tape = field(init=False, repr=False)
+    noise: Array = field(init=False, repr=False)
+    physical_range: StateRange | None = field(init=False, repr=False)
+    valid_range: StateRange | None = field(init=False, repr=False)
+    start_range: StateRange = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
+        for what in ("states", "inputs", "disturbances"):
+            put(what, _names(what, getattr(self, what)))
+        if not self.states:
+            raise ValueError("states is empty; expected at least one name, one a row of f")
+        put("Ts", positive_number("Ts", self.Ts, "sampling time in seconds"))
+        span = _bounds(self.w, self.disturbances, self.parameters)
+        all_names = [*self.states, *self.inputs, *self.disturbances, *self.parameters]
+        twice = next((name for name in all_names if all_names.count(name) > 1), None)
+        expect(twice is None, "a name", twice, "names of states, inputs, disturbances and parameters that differ")
+        size = Sizes(len(self.states), len(self.disturbances), len(self.parameters), len(self.inputs))
+        for name in ("physical", "valid"):
+            put(f"{name}_range", state_range(name, getattr(self, name), size.x, bounded=False))
+        largest = start_range(self.physical_range, state_range("largest", self.largest, size.x, bounded=True))
+        if largest is None:
+            raise ValueError(
+                "largest is missing, and physical is not bounded; expected largest=(lower, upper): where the state is "
+                "when a set has to start again, which every later alarm then rests on"
+            )
+        put("start_range", largest)
+        tape = traced("f", self.f, size, self.states)
+        varies = _varying(self.varying, self.disturbances, list(self.parameters))
+        put("flow", Flow(tape, span, varies, tuple(self.states), self.physical_range, self.valid_range))
+        outputs = None if self.outputs is None else _names("outputs", self.outputs)
+        put("reading", traced("h", self.h, size, outputs))
+        ny = len(self.reading.outputs)
+        put("outputs", outputs or tuple(f"y[{i}]" for i in range(ny)))
+        noise = np.full(ny, self.n) if np.ndim(self.n) == 0 else self.n
+        put("noise", sizes("n", noise, ny))
+
+    # -- sizes -----------------------------------------------------------------------------------
+
+    @property
+    def n_states(self) -> int:
+        return len(self.states)
+
+    @property
+    def n_inputs(self) -> int:
+        return len(self.inputs)
+
+    @property
+    def n_outputs(self) -> int:
+        return len(self.noise)
+
+    @property
+    def n_disturbances(self) -> int:
+        return len(self.disturbances)
+
+    @property
+    def is_scheduled(self) -> bool:
+        """Never: an observer asks for the matrices of a sample itself."""
+        return False
+
+    @property
+    def uses_input_in_output(self) -> bool:
+        """Whether y(k) depends on u(k), so that a step needs ``u_next``."""
+        used = self.reading.used
+        return bool(used[len(used) - self.n_inputs :].any())
+
+    @property
+    def names(self) -> Mapping[str, Sequence[str]]:
+        """Of states, inputs, outputs and disturbances."""
+        every = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs or ()}
+        return every | {"disturbances": self.disturbances}
+
+    @cached_property
+    def carrier(self) -> Any:
+        """The `UncertainModel` whose schedule is the `Linearisation` of a sample: what an observer's kernel is given.
+
+        Its disturbances are w, p, and one a state between -1 and 1, whose column is the remainder.
+        """
+        return carrier_of(self.flow, self.noise, self.Ts, self.physical, self.largest)
+
+    # -- over a set ------------------------------------------------------------------------------
+
+    def transition(
+        self, lower: ArrayLike, upper: ArrayLike, u: ArrayLike = (), *, dt: float | None = None
+    ) -> Transition:
+        """x+ in A x + a + E (w, p) + [-R, R] for all states of a box, all w and all p.
+
+        Parameters
+        ----------
+        lower, upper : (n,) arrays
+            The box.
+        u : (nu,) array
+            Held over the transition.
+        dt : float, optional
+            Its length [s]; by default ``Ts``. Only of a continuous model.
+
+        Raises
+        ------
+        Undecided
+            If it is not enclosed, leaves ``valid``, or leaves out more than ``largest`` is wide.
+        TypeError, ValueError
+            For a wrong shape, NaN or Inf, or a ``dt`` of a model in discrete time.
+        """
+        start = self._box(lower, upper)
+        inputs: Array = finite_array("u", u, (self.n_inputs,))
+        if not self.continuous:
+            expect(dt is None, "dt", dt, "None for a model in discrete time")
+            found = mapped(self.flow, start, inputs)
+        else:
+            T = self.Ts if dt is None else positive_number("dt", dt, "number of seconds")
+            found = transition(self.flow, start, inputs, T)
+            if found.substeps == 1 and (found.R - _WORTH_ANOTHER * found.box.width > 0.0).any():
+                finer = transition(self.flow, start, inputs, T, least=2)
+                found = finer if (finer.R <= found.R).all() else found
+        beyond = found.R - (self.start_range.upper - self.start_range.lower)
+        if not (beyond <= 0.0).all():
+            j = int(np.argmax(beyond))
+            raise Undecided(f"the remainder of {self.states[j]} is wider than largest", coordinate=j)
+        return found
+
+    def output(self, lower: ArrayLike, upper: ArrayLike, u: ArrayLike = ()) -> LinearOutput:
+        """h in C x + c + [-R, R] for all states of a box, all w and all p.
+
+        Parameters
+        ----------
+        lower, upper : (n,) arrays
+        u : (nu,) array
+            At the sample of the output.
+
+        Raises
+        ------
+        Undecided
+            If it is not enclosed.
+        TypeError, ValueError
+            For a wrong shape, NaN or Inf.
+        """
+        inputs = finite_array("u", u, (self.n_inputs,))
+        return linear_output(self.reading, self.flow.w, self._box(lower, upper), inputs, self.outputs or ())
+
+    def _box(self, lower: ArrayLike, upper: ArrayLike) -> Span:
+        box = Span(*(finite_array(n, v, (self.n_states,)) for n, v in (("lower", lower), ("upper", upper))))
+        expect((box.lower <= box.upper).all(), "lower", box.lower, f"bounds not above upper = {box.upper}")
+        return box
+
+    # -- simulation ------------------------------------------------------------------------------
+
+    @options_by_name
+    def simulate(
+        self, x0: ArrayLike, u: ArrayLike, rng: np.random.Generator, *, corners: bool = False, substeps: int = 20
+    ) -> Log:
+        """A run with random w, p and noise inside their bounds, for tests and tutorials.
+
+        Equations in continuous time are integrated by Runge and Kutta's method of fourth order; what varies switches
+        four times within a sample.
+
+        Parameters
+        ----------
+        x0 : (n,) array
+        u : (K, nu) array
+            One row a sample; the log has K samples.
+        rng : numpy.random.Generator
+        corners : bool
+            Draw every w, p and noise at an end of its interval instead of uniformly inside.
+        substeps : int
+            Steps of the integration within a quarter of a sample.
+
+        Raises
+        ------
+        TypeError
+            If rng is no Generator.
+        ValueError
+            For a wrong shape, NaN or Inf, or if the run leaves the range where the equations have values.
+        """
+        inputs = finite_array("u", u, ("samples", self.n_inputs))
+        x: Array = finite_array("x0", x0, (self.n_states,))
+        expect_shape(len(inputs), "u", inputs, f"(samples, {self.n_inputs}), at least one sample")
+        expect_kind("rng", rng, np.random.Generator, "a numpy Generator, such as np.random.default_rng(0)")
+        expect(is_count(substeps, 1), "substeps", substeps, "a number of steps >= 1")
+        T = self.Ts if self.continuous else None
+        return simulated(self.flow, self.reading, self.noise, self.Ts, x, inputs, rng, corners, T, int(substeps))
+
+
+def _names(what: str, given: Any) -> tuple[str, ...]:
+    if isinstance(given, str) or not all(isinstance(name, str) for name in given):
+        raise TypeError(f"{what} is {given!r:.80}; expected a list of names")
+    return tuple(given)
+
+
+def _bounds(w: Any, disturbances: Sequence[str], parameters: Any) -> Span:
+    """Bounds of disturbances, then parameters."""
+    nw = len(disturbances)
+    if w is None:
+        expect(nw == 0, "w", w, f"bounds of the {nw} disturbances: (lower, upper), or a half-width vector ({nw},)")
+        w = np.zeros(0)
+    if isinstance(w, tuple) and len(w) == 2:
+        lower, upper = (finite_array(f"w[{i}]", end, (nw,)) for i, end in enumerate(w))
+    else:
+        upper = sizes("w", w, nw)
+        lower = -upper
+    expect_kind("parameters", parameters, Mapping, "a mapping from names to (lower, upper)")
+    ends = [finite_array(f"parameters[{name!r}]", ends, (2,)) for name, ends in parameters.items()]
+    p = np.array(ends, dtype=float).reshape(-1, 2)
+    span = Span(np.concatenate([lower, p[:, 0]]), np.concatenate([upper, p[:, 1]]))
+    names = [*disturbances, *parameters]
+    for name, low, high in zip(names, *span, strict=True):
+        if low > high:
+            raise ValueError(f"{name} is between {low} and {high}; expected lower <= upper")
+    return span
+
+
+def _varying(varying: Any, disturbances: Sequence[str], parameters: Sequence[str]) -> NDArray[np.bool_]:
+    chosen = [varying] if isinstance(varying, str) else list(varying)
+    groups = {"all": [*disturbances, *parameters], "w": disturbances, "p": parameters}
+    names = {name: [name] for name in groups["all"]}
+    known = groups | names  # a name of a disturbance or a parameter comes before that of a group
+    for name in chosen:
+        if name not in known:
+            raise ValueError(f"varying names {name!r}; expected any of {', '.join(known)}")
+    moves = {member for name in chosen for member in known[name]}
+    return np.array([name in moves for name in groups["all"]], dtype=bool)

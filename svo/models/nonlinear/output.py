@@ -1,0 +1,58 @@
+"""A measurement over a box of states: h(x, u, w, p) in C x + c + [-R, R]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from svo.checks import Array
+from svo.functions.tape import Tape, Unenclosed
+from svo.models.nonlinear.flow import Span, Undecided
+
+_EPS = float(np.finfo(np.float64).eps)
+
+
+class LinearOutput(NamedTuple):
+    """h in C x + c + [-R, R] for all states of a box: (ny, n), (ny,), (ny,) arrays."""
+
+    C: Array
+    c: Array
+    R: Array
+
+
+def linear_output(tape: Tape, w: Span, x: Span, u: Array, names: Sequence[str]) -> LinearOutput:
+    """Of the tape of h, whose disturbances and parameters go into R."""
+    n = len(x.lower)
+    lower, upper = (np.concatenate([x[i], w[i], u]) for i in range(2))
+    try:
+        forms = tape.forms(lower, upper, free=n + len(w.lower))
+    except Unenclosed as error:
+        raise Undecided(f"the output {names[error.row]} is not enclosed, {error}") from None
+    C, F, centre = forms.g[:, :n], forms.g[:, n:], forms.centre[:n]
+    size = (
+        np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high) + np.abs(C) @ (2.0 * x.largest) + np.abs(F) @ w.largest
+    )
+    R = 0.5 * (forms.high - forms.low) + np.abs(F) @ (0.5 * w.width)
+    R = R + (n + len(w.lower) + 8) * _EPS * size
+    return LinearOutput(C, forms.k + 0.5 * (forms.low + forms.high) - C @ centre, R)
+
+
+def cut(box: Span, y: Array, reading: LinearOutput, noise: Array) -> Span | None:
+    """A box cut by what was measured, row by row; None where nothing is left, which a program has to decide."""
+    lower, upper = box.lower.copy(), box.upper.copy()
+    C, c = reading.C, reading.c
+    width = noise + reading.R
+    size = np.abs(C) @ box.largest + np.abs(c) + width
+    for i in np.flatnonzero(~np.isnan(y)).tolist():
+        room = width[i] + 4.0 * (len(lower) + 4) * _EPS * (size[i] + abs(y[i]))
+        for j in np.flatnonzero(C[i]).tolist():
+            low, high = np.minimum(C[i] * lower, C[i] * upper), np.maximum(C[i] * lower, C[i] * upper)
+            least, most = y[i] - c[i] - room - (high.sum() - high[j]), y[i] - c[i] + room - (low.sum() - low[j])
+            ends = sorted((least / C[i, j], most / C[i, j]))
+            lower[j] = max(lower[j], ends[0] - 4.0 * _EPS * abs(ends[0]))
+            upper[j] = min(upper[j], ends[1] + 4.0 * _EPS * abs(ends[1]))
+            if lower[j] > upper[j]:
+                return None
+    return Span(lower, upper)

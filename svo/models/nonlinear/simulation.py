@@ -1,0 +1,79 @@
+"""Runs of a nonlinear model with random disturbances, parameters and noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from svo.checks import Array
+from svo.functions.tape import Tape
+from svo.logs.log import Log
+from svo.models.draws import draw
+from svo.models.nonlinear.flow import Flow
+
+_PIECES = 4  # of a sample, between which what varies may switch
+
+
+def simulated(
+    flow: Flow,
+    reading: Tape,
+    noise: Array,
+    Ts: float,
+    x: Array,
+    inputs: Array,
+    rng: np.random.Generator,
+    corners: bool,
+    T: float | None,
+    substeps: int,
+) -> Log:
+    """See `NonlinearModel.simulate`; ``T`` is None for equations in discrete time."""
+    states, outputs = [], []
+    for u in inputs:
+        w = draw(flow.w.lower, flow.w.upper, rng, corners)
+        states.append(x)
+        outputs.append(reading.values(np.concatenate([x, w, u])) + draw(-noise, noise, rng, corners))
+        x = advanced(flow, x, w, u, rng, corners, T, substeps)
+        _check(flow, x, len(states) - 1)
+    time: Array = np.arange(len(inputs), dtype=float) * Ts
+    return Log(time=time, u=inputs, y=np.array(outputs), x=np.array(states))
+
+
+def advanced(
+    flow: Flow, x: Array, w: Array, u: Array, rng: np.random.Generator, corners: bool, T: float | None, substeps: int
+) -> Array:
+    """The next state; what varies has w at the sample only, and others within it."""
+    if T is None:
+        return flow.tape.values(np.concatenate([x, w, u]))
+    for piece in range(_PIECES):
+        if piece:
+            w = np.where(flow.varying, draw(flow.w.lower, flow.w.upper, rng, corners), w)
+        x = integrated(flow, x, w, u, T / _PIECES, substeps)
+    return x
+
+
+def integrated(flow: Flow, x: Array, w: Array, u: Array, T: float, substeps: int) -> Array:
+    """x(T) by Runge and Kutta's method of fourth order, for states (..., n) with their own w (..., nw)."""
+    h, inputs = T / substeps, np.broadcast_to(u, (*x.shape[:-1], len(u)))
+
+    def slope(at: Array) -> Array:
+        if flow.physical is not None:  # a stage may be a rounding beyond a face
+            at = np.clip(at, flow.physical.lower, flow.physical.upper)
+        return flow.tape.values(np.concatenate([at, w, inputs], axis=-1))
+
+    for _ in range(substeps):
+        k1 = slope(x)
+        k2 = slope(x + 0.5 * h * k1)
+        k3 = slope(x + 0.5 * h * k2)
+        x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + slope(x + h * k3))
+    return x
+
+
+def _check(flow: Flow, x: Array, sample: int) -> None:
+    inside = np.isfinite(x)
+    if flow.physical is not None:
+        inside &= (x >= flow.physical.lower) & (x <= flow.physical.upper)
+    if not inside.all():
+        j = int(np.argmin(inside))
+        raise ValueError(
+            f"{flow.states[j]} is {x[j]} after sample {sample}, where the equations have no value or outside physical; "
+            "expected an x0, inputs and bounds of w that keep the plant there"
+        )

@@ -1,0 +1,73 @@
+"""From the user's functions of vectors to tapes of z = (x, w, p, u)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from inspect import Parameter, signature
+from typing import Any, NamedTuple
+
+from svo.functions.expression import Recorder, rows_of, variables
+from svo.functions.tape import Tape
+
+ORDER = "xwpu"  # of the coordinates of z
+_MEANING = {"x": "states", "u": "inputs", "w": "disturbances", "p": "parameters"}
+
+
+class Sizes(NamedTuple):
+    """How many states, disturbances, parameters and inputs there are."""
+
+    x: int
+    w: int
+    p: int
+    u: int
+
+
+def traced(what: str, function: Any, sizes: Sizes, names: Sequence[str] | None) -> Tape:
+    """The tape of a function whose arguments are named u, w and p, and one by any other name, which is the state.
+
+    ``names`` are those of its rows; None takes as many as it returns.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is no such function, or does what a tape cannot hold; the message names the function and the row.
+    """
+    recorder, vectors, first = Recorder(), {}, 0
+    for letter, size in zip(ORDER, sizes, strict=True):
+        vectors[letter] = variables(recorder, first, size)
+        first += size
+    arguments = _arguments(what, function, sizes)
+    try:
+        found = function(**{name: vectors[letter] for name, letter in arguments.items()})
+    except IndexError as error:
+        have = ", ".join(f"{getattr(sizes, k)} {_MEANING[k]}" for k in arguments.values())
+        raise ValueError(f"{what} reads an entry that is not there ({error}); there are {have}") from error
+    except (TypeError, ValueError) as error:
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        raise kind(f"{what}: {error}") from error
+    if names is None:
+        found = list(found)
+        names = [f"y[{i}]" for i in range(len(found))]
+    return Tape.of(recorder, rows_of(what, found, recorder, names), first)
+
+
+def _arguments(what: str, function: Any, sizes: Sizes) -> Mapping[str, str]:
+    """Which vector each argument of a function stands for."""
+    if not callable(function):
+        raise TypeError(f"{what} is a {type(function).__name__}; expected a function such as def {what}(x, u): ...")
+    kinds = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY)
+    given = [p for p in signature(function).parameters.values() if p.default is Parameter.empty]
+    named = {p.name: p.name if p.name in "uwp" else "x" for p in given}
+    if not all(p.kind in kinds for p in given) or list(named.values()).count("x") > 1:
+        shown = ", ".join(map(str, signature(function).parameters.values()))
+        raise TypeError(
+            f"{what} has the arguments ({shown}); expected any of u (inputs), w (disturbances) and p (parameters) by "
+            "these names, and one more, by any name, for the states"
+        )
+    for letter in named.values():
+        if not getattr(sizes, letter):
+            raise ValueError(f"{what} has an argument {letter!r}, but the model has no {_MEANING[letter]}")
+    return named
+
+
+Function = Callable[..., Any]
