@@ -7,6 +7,7 @@ everything there: what it is given of a sample was written to the arrays ``in_*`
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -104,7 +105,7 @@ class Block:
         self.arrays: dict[str, NDArray[Any]] = {}
         for name, (_, kind, dimensions, *lengths, offset) in zip(_NAMES, table.tolist(), strict=True):
             shape, entry = lengths[:dimensions], _KINDS[kind]
-            part = self._bytes[offset : offset + entry.itemsize * int(np.prod(shape))]
+            part = self._bytes[offset : offset + entry.itemsize * math.prod(shape)]
             self.arrays[name] = part.view(entry).reshape(shape)
         self.kept = tuple(name for name, kept in zip(_NAMES, table[:, 0], strict=True) if kept)
 

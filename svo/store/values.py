@@ -6,7 +6,7 @@ A record is somebody's file: what is read has the exact type and shape that `enc
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import cache
 from types import NoneType, UnionType
@@ -19,7 +19,9 @@ from polytopes import Certificate, HPolytope
 from svo.checks import Array
 
 LARGEST_INTEGER = 2**53
-_FLOAT = re.compile(r"0|nan|-?inf|-?0x[01](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
+_ZERO = (0.0).hex()  # is written as 0
+_WORD = r"(?:-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf)"  # none is the beginning of a later one
+_FLOAT, _FLOATS = re.compile(_WORD), re.compile(rf"(?:{_WORD}(?: {_WORD})*+)?")
 
 
 def encode_value(value: Any) -> Any:
@@ -27,7 +29,8 @@ def encode_value(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         if np.issubdtype(value.dtype, np.integer):
             return value.tolist()
-        return {"shape": list(value.shape), "hex": " ".join(_hex(v) for v in value.ravel())}
+        words = map(float.hex, np.asarray(value, dtype=np.float64).ravel().tolist())
+        return {"shape": list(value.shape), "hex": " ".join("0" if word == _ZERO else word for word in words)}
     if isinstance(value, tuple):
         return [encode_value(item) for item in value]
     if isinstance(value, HPolytope):
@@ -58,8 +61,10 @@ def decode_array(value: Any) -> Array:
     """A float array that `encode_value` wrote."""
     check_keys(value, {"shape", "hex"})
     shape = tuple(decode_integer(length) for length in _list(value["shape"]))
-    words = value["hex"].split(" ") if value["hex"] else []
-    return np.array([decode_float(word) for word in words], dtype=np.float64).reshape(shape)
+    text = value["hex"]
+    words = text.split(" ") if text else []
+    decode = float.fromhex if _FLOATS.fullmatch(text) else decode_float  # which names the first word that is none
+    return np.array(list(map(decode, words)), dtype=np.float64).reshape(shape)
 
 
 def decode_integers(value: Any) -> NDArray[np.int64]:
@@ -90,11 +95,11 @@ def decode_value(kind: Any, record: Any) -> Any:
     """
     if isinstance(kind, UnionType):
         (kind,) = (item for item in get_args(kind) if item is not NoneType)
+    decode = _DECODERS.get(kind)
+    if decode is not None:
+        return decode(record)
     if get_origin(kind) is tuple:
         return tuple(decode_value(get_args(kind)[0], item) for item in _list(record))
-    for known, decode in _DECODERS:
-        if kind == known:
-            return decode(record)
     kinds, optional = _fields(kind)
     check_keys(record, kinds.keys() - (optional - record.keys() if isinstance(record, Mapping) else set()))
     return kind(**{name: decode_value(kinds[name], value) for name, value in record.items()})
@@ -106,14 +111,14 @@ def _decode_truth(value: Any) -> bool:
     return value
 
 
-_DECODERS = (
-    (Array, decode_array),
-    (NDArray[np.int64], decode_integers),
-    (int, decode_integer),
-    (bool, _decode_truth),
-    (HPolytope, decode_set),
-    (Certificate, Certificate.from_dict),
-)
+_DECODERS: dict[Any, Callable[[Any], Any]] = {
+    Array: decode_array,
+    NDArray[np.int64]: decode_integers,
+    int: decode_integer,
+    bool: _decode_truth,
+    HPolytope: decode_set,
+    Certificate: Certificate.from_dict,
+}
 
 
 @cache
@@ -145,7 +150,3 @@ def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 40 else f"{text[:40]}..."
 
-
-def _hex(value: float) -> str:
-    text = float(value).hex()
-    return "0" if text == "0x0.0p+0" else text

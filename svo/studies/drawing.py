@@ -15,5 +15,8 @@ if TYPE_CHECKING:
 
 def save_picture(path: Path, figure: Figure, title: str, caption: str) -> Picture:
     """Write a figure as a PNG file, whole or not at all."""
-    write_whole(path, lambda file: figure.savefig(file, dpi=DPI))
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(DPI)
+    write_whole(path, FigureCanvasAgg(figure).print_png)  # savefig would draw all of it once more, for the layout
     return Picture(path, title, caption)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy import stats
+from scipy import special  # scipy.stats has the same quantiles, and takes a second to load
 
 CONFIDENCE = 0.95
 Row = TypeVar("Row")
@@ -42,8 +42,8 @@ class Share:
     def interval(self) -> tuple[float, float]:
         """Bounds of the share at the confidence of the module, 95 %."""
         tail = (1 - CONFIDENCE) / 2
-        low = stats.beta.ppf(tail, self.count, self.of - self.count + 1) if self.count else 0.0
-        high = stats.beta.ppf(1 - tail, self.count + 1, self.of - self.count) if self.count < self.of else 1.0
+        low = special.betaincinv(self.count, self.of - self.count + 1, tail) if self.count else 0.0
+        high = special.betaincinv(self.count + 1, self.of - self.count, 1 - tail) if self.count < self.of else 1.0
         return float(low), float(high)
 
 
@@ -91,5 +91,5 @@ def _quantile(delays: Sequence[float | None], q: float) -> float | None:
 def _mean_interval(values: np.ndarray) -> tuple[float, float] | None:
     if values.size < 2:
         return None
-    half = stats.t.ppf((1 + CONFIDENCE) / 2, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size)
+    half = special.stdtrit(values.size - 1, (1 + CONFIDENCE) / 2) * values.std(ddof=1) / np.sqrt(values.size)
     return float(values.mean() - half), float(values.mean() + half)

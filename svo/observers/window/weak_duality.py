@@ -120,10 +120,11 @@ class DualSum:
     @staticmethod
     def _combine(target: list[fmpq], matrix: Array, weight: list[fmpq]) -> None:
         """target += weight' matrix, over the nonzero entries."""
-        for i, w in enumerate(weight):
+        for w, row in zip(weight, matrix.tolist(), strict=True):
             if w:
-                for j in np.flatnonzero(matrix[i]):
-                    target[j] += w * rational(matrix[i, j])
+                for j, entry in enumerate(row):
+                    if entry:
+                        target[j] += w * rational(entry)
 
     def _channels(self, s: WindowSample, weight: list[fmpq], known: list[fmpq], of: Factors, newest: bool) -> None:
         """Add each channel's p: its box, its two lines over s = functional'(x, u, 1, w), and its effect.

@@ -149,32 +149,29 @@ def planar_outline(step: Step) -> HPolytope:
     return step.set.intersection(HPolytope(directions, step.support(directions)))
 
 
-def follow(plant: Plant, job: Job, log: Log) -> Exemplar:
-    """Drive a fresh bank over a log and keep what it knew at each sample."""
+def follow(plant: Plant, job: Job, log: Log, alive: NDArray[np.bool_]) -> Exemplar:
+    """Drive a fresh bank over a log and keep what it knew at each sample.
+
+    ``alive`` (K, n_observers) is what a run of the bank said: it tells beforehand at which samples sets are kept.
+    """
     if log.x is None:
         raise ValueError(f"plant {plant.name!r} simulates without true states; expected Log.x for the pictures")
     bank = plant.bank(job.noise)
-    n, names = log.x.shape[1], tuple(bank.names)
-    alive = np.zeros((len(log), len(names)), dtype=bool)
-    lower = np.full((len(log), len(names), n), np.nan)
+    names, last = tuple(bank.names), len(log) - 1
+    falls = np.vstack([alive[:-1] & ~alive[1:], np.zeros_like(alive[:1])])
+    lower = np.full((len(log), len(names), log.x.shape[1]), np.nan)
     upper = lower.copy()
     snapshots: list[Snapshot] = []
-    sets: dict[str, HPolytope] = {}
-    living: tuple[str, ...] = names
     begins = fault_start(plant, job.fault, job.profile)
     for k, verdict in enumerate(drive(bank, log)):
-        fallen = [name for name in living if name not in verdict.alive]
-        if fallen and sets:
-            snapshots.append(Snapshot(k - 1, f"{', '.join(fallen)} falsified next", sets))
-        living = verdict.alive
-        steps = {name: verdict.steps[name] for name in living if name in verdict.steps}  # class II waits
-        shown = log.time[k] >= begins - plant.Ts and len(living) > 1  # what a snapshot may keep
-        sets = {name: planar_outline(step) if shown else step.set for name, step in steps.items()}
-        alive[k] = [name in living for name in names]
-        for name, step in steps.items():
-            i = names.index(name)
+        steps = {i: verdict.steps[names[i]] for i in np.flatnonzero(alive[k]) if names[i] in verdict.steps}
+        for i, step in steps.items():  # without class II that waits
             lower[k, i], upper[k, i] = step.box
-    snapshots.append(Snapshot(len(log) - 1, "end of the run", sets))
+        if (steps and falls[k].any()) or k == last:
+            compared = log.time[k] >= begins - plant.Ts and np.count_nonzero(alive[k]) > 1
+            sets = {names[i]: planar_outline(step) if compared else step.set for i, step in steps.items()}
+            fallen = ", ".join(name for name, falls_next in zip(names, falls[k], strict=True) if falls_next)
+            snapshots.append(Snapshot(k, f"{fallen} falsified next" if k < last else "end of the run", sets))
     return Exemplar(
         job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots),
         job.architecture,

@@ -98,7 +98,7 @@ def execute(plant: Plant, job: Job) -> RunOutcome:
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     bank = plant.bank(job.noise)
     record = bank.run(log)
-    exemplar = follow(plant, job, log) if job.exemplary else None
+    exemplar = follow(plant, job, log, record.alive) if job.exemplary else None
     alarms = alarms_of(record, log, source_of(plant, job), bank.observers)
     return RunOutcome(judge(plant, job, log, record), alarms, exemplar)
 

@@ -62,6 +62,7 @@ def test_banks_are_fresh_and_named_as_the_faults():
     first, second = PLANT.bank("quiet"), PLANT.bank("quiet")
     assert tuple(first.names) == ("nominal", *PLANT.faults)
     assert first.observers["nominal"] is not second.observers["nominal"]
+    assert first.observers["nominal"].model is second.observers["nominal"].model  # a value, made once
 
 
 def test_initial_set_holds_every_start_between_25_and_55():

@@ -5,9 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.plant import Plant, load_plant
 from svo.studies.configuration import Job
+from svo.studies.isolation import exemplar as exemplar_module
 from svo.studies.isolation.run import execute, judge
 
 NAMES = ("nominal", "leak", "gauge")
@@ -102,3 +104,26 @@ def test_a_real_run_is_isolated_with_proofs_and_its_exemplar_holds_the_truth(tan
     for snapshot in exemplar.snapshots:
         assert all(polytope.contains(exemplar.x[snapshot.sample]) for polytope in snapshot.sets.values())
     assert [snapshot.sample for snapshot in exemplar.snapshots] == [9, 39]
+
+
+def test_an_exemplar_has_every_box_and_only_the_outlines_that_it_keeps(
+    tank: Plant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outlined: list[int] = []
+    outline = exemplar_module.planar_outline
+    monkeypatch.setattr(exemplar_module, "planar_outline", lambda step: outlined.append(step.sample) or outline(step))
+    job = Job(0, "gauge", "step", "calm", 1, exemplary=True)
+    exemplar = execute(tank, job).exemplar
+    assert exemplar is not None
+    log, bank = tank.simulate("gauge", "step", "calm", 1), tank.bank("calm")
+    alive = bank.run(log).alive
+    np.testing.assert_array_equal(exemplar.alive, alive)
+    before = np.flatnonzero((alive[:-1] & ~alive[1:]).any(axis=1)).tolist()
+    assert [snapshot.sample for snapshot in exemplar.snapshots] == [*before, len(log) - 1]
+    assert len(outlined) == sum(len(snapshot.sets) for snapshot in exemplar.snapshots[:-1])  # the last has one model
+    assert set(outlined) == set(before)
+    for k, verdict in enumerate(drive(tank.bank("calm"), log)):
+        for i, name in enumerate(exemplar.names):
+            step, found = verdict.steps.get(name), (exemplar.lower[k, i], exemplar.upper[k, i])
+            expected = step.box if step is not None and alive[k, i] else np.full((2, 1), np.nan)
+            np.testing.assert_array_equal(found, expected)
