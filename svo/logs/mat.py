@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from svo.logs.columns import Array, Note, check_cells, noted, wanted_columns
+from svo.logs.dialect.mat import places_in
 from svo.logs.mat_file import MatFile
 from svo.logs.names import Columns
 from svo.logs.portions import Rows, samples_from
@@ -36,13 +37,25 @@ def write_mat(path: Path, cells: Mapping[str, Array]) -> None:
     savemat(path, {name: values[:, None] for name, values in cells.items()}, appendmat=False)
 
 
+def _elsewhere(path: Path, file: MatFile) -> str:
+    """What a message says of numbers that stand inside structures."""
+    if "a struct" not in file.kinds.values():
+        return ""
+    return f". Numbers are at {places_in(path)}: state these places as column in [log.columns] and [log.time]"
+
+
 def read_mat_log(path: Path, columns: Columns, note: Note = noted) -> Iterator[Rows]:
     """The rows of a log, all at once; errors name the sample and the variable."""
     file = MatFile.open(path)
     needed = (columns.time, *(c.name for c in columns.inputs + columns.outputs))
     for name, kind in file.kinds.items():
         if name in needed and kind != "numbers":
-            raise ValueError(f"{path} has no column {name!r} of numbers; the variable of that name is {kind}")
+            raise ValueError(
+                f"{path} has no column {name!r} of numbers; the variable of that name is {kind}{_elsewhere(path, file)}"
+            )
+    if set(needed) - set(file.numeric) and (elsewhere := _elsewhere(path, file)):
+        lost = ", ".join(repr(name) for name in needed if name not in file.numeric)
+        raise ValueError(f"{path} has no variable {lost}{elsewhere}")
     names = wanted_columns(str(path), file.numeric, columns)
     variables = file.read(names)
     samples = variables[columns.time].size

@@ -10,6 +10,7 @@ import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,20 +58,18 @@ class Element:
     @property
     def unpacked(self) -> int:
         """Bytes that reading it needs."""
-        return 8 * math.prod(self.shape) + (_size(self.content, self.order) if self.compressed else 0)
+        content = _size(self.content, self.order) if self.compressed else 0
+        return content + (8 * math.prod(self.shape) if self.kind == "numbers" else len(self.content))
+
+    def body(self) -> memoryview:
+        """The matrix, unpacked, from its tag on."""
+        return _inflate_all(self.content, self.order) if self.compressed else self.content
 
     def read(self) -> NDArray[np.float64]:
         """The array, for an element of numbers."""
-        content = _inflate_all(self.content, self.order) if self.compressed else self.content
-        cursor = _Cursor(content, self.order)
+        cursor = Cursor(self.body(), self.order)
         cursor.matrix()
-        kind, data = cursor.element()
-        if kind not in _NUMBERS:
-            raise Damaged(f"its numbers have the unknown type {kind}")
-        dtype = np.dtype(self.order + _NUMBERS[kind])
-        if len(data) != math.prod(self.shape) * dtype.itemsize:
-            raise Damaged(f"it has {len(data)} bytes of numbers, which are not those of shape {self.shape}")
-        return np.frombuffer(data, dtype).astype(float).reshape(self.shape, order="F")
+        return cursor.numbers(self.shape).astype(float)
 
 
 def elements(content: memoryview, order: str) -> Iterator[Element]:
@@ -99,7 +98,7 @@ def elements(content: memoryview, order: str) -> Iterator[Element]:
                 yield found
 
 
-class _Cursor:
+class Cursor:
     """Reads the elements inside a matrix, one after the other."""
 
     def __init__(self, content: memoryview, order: str) -> None:
@@ -120,6 +119,27 @@ class _Cursor:
             shape = tuple(int(d) for d in dimensions)
         name = self._array("name", _INT8)
         return flags, shape, name.tobytes().decode("latin-1")
+
+    def nested(self) -> memoryview:
+        """The matrix that begins here, from its tag on."""
+        begin, (kind, size) = self._at, self._tag()
+        if kind != _MATRIX:
+            raise Damaged(f"an element of type {kind} is no variable")
+        self._at = begin + 8 + size + -size % 8
+        content = self._content[begin : begin + 8 + size]
+        if len(content) < 8 + size:
+            raise Damaged("a variable ends too early")
+        return content
+
+    def numbers(self, shape: tuple[int, ...]) -> NDArray[Any]:
+        """The array of that shape that the next element holds."""
+        kind, data = self.element()
+        if kind not in _NUMBERS:
+            raise Damaged(f"its numbers have the unknown type {kind}")
+        dtype = np.dtype(self._order + _NUMBERS[kind])
+        if len(data) != math.prod(shape) * dtype.itemsize:
+            raise Damaged(f"it has {len(data)} bytes of numbers, which are not those of shape {shape}")
+        return np.frombuffer(data, dtype).reshape(shape, order="F")
 
     def element(self) -> tuple[int, memoryview]:
         """Type and bytes of the next element."""
@@ -151,18 +171,28 @@ class _Cursor:
         return np.frombuffer(data, dtype)
 
 
-def _head(head: memoryview, content: memoryview, compressed: bool, order: str) -> Element:
-    flags, shape, name = _Cursor(head, order).matrix()
+def kind_of(flags: int) -> str:
+    """"numbers" for real ones, else in words what a matrix is.
+
+    Raises
+    ------
+    Damaged
+    """
     number = flags & 0xFF
     if number in _NUMERIC_CLASSES:
-        kind = "an array of complex numbers" if flags & _COMPLEX else "numbers"
+        return "an array of complex numbers" if flags & _COMPLEX else "numbers"
+    if number not in _OTHER_CLASSES:
+        raise Damaged(f"it is of the unknown class {number}")
+    return _OTHER_CLASSES[number]
+
+
+def _head(head: memoryview, content: memoryview, compressed: bool, order: str) -> Element:
+    flags, shape, name = Cursor(head, order).matrix()
+    kind = kind_of(flags)
+    if flags & 0xFF in _NUMERIC_CLASSES:
         size = _size(content, order) if compressed else len(content)
         if math.prod(shape) > size or size > _MOST_COMPRESSED * len(content):
             raise Damaged(f"variable {name!r:.80} has too few bytes for numbers of shape {shape}")
-    elif number in _OTHER_CLASSES:
-        kind = _OTHER_CLASSES[number]
-    else:
-        raise Damaged(f"variable {name!r:.80} is of the unknown class {number}")
     return Element(name, kind, shape, content, compressed, order)
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from svo.checks import Array
-from svo.logs.mat_elements import Damaged, elements
+from svo.logs.mat_elements import Damaged, Element, elements
 from svo.store.unpacking import check_unpacked
 
 _HEADER = 128
@@ -23,6 +23,7 @@ class _Variable(NamedTuple):
     kind: str
     unpacked: int
     read: Callable[[], Array]
+    matrix: Callable[[], tuple[memoryview, str]] | None = None
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class MatFile:
             If the file cannot be opened.
         """
         content = Path(path).read_bytes()
-        if content[:10] == b"MATLAB 7.3" or content[:8] == _HDF5 or content[124:128] in (b"\0\2IM", b"\2\0MI"):
+        if is_hdf5(content):
             raise ValueError(
                 f"{path} is a MAT file of version 7.3 (HDF5), which is not supported; "
                 "expected version 7.2 or older: in MATLAB, save('log.mat', '-v7', ...)"
@@ -69,6 +70,23 @@ class MatFile:
     @property
     def kinds(self) -> dict[str, str]:
         return {name: variable.kind for name, variable in self._variables.items()}
+
+    def matrix(self, name: str) -> tuple[memoryview, str] | None:
+        """A variable as it stands in a file of version 5 to 7.2, unpacked, and the order of its bytes.
+
+        Raises
+        ------
+        ValueError
+            If it is damaged, or unpacks to more than `svo.store.unpacking` allows.
+        """
+        variable = self._variables[name]
+        if variable.matrix is None:
+            return None
+        check_unpacked(self.path, variable.unpacked)
+        try:
+            return variable.matrix()
+        except Damaged as error:
+            raise _damaged(self.path, f"variable {name!r:.80}: {error}") from error
 
     @property
     def numeric(self) -> list[str]:
@@ -109,6 +127,11 @@ def read_mat(path: str | Path) -> dict[str, Array]:
     return file.read(file.numeric)
 
 
+def is_hdf5(content: bytes) -> bool:
+    """Whether a file begins as one of version 7.3 does."""
+    return content[:10] == b"MATLAB 7.3" or content[:8] == _HDF5 or content[124:128] in (b"\0\2IM", b"\2\0MI")
+
+
 def _damaged(path: str | Path, what: str) -> ValueError:
     return ValueError(
         f"{path} is not a MAT file, or is damaged or cut off: {what}; expected a whole one of version 4 to 7.2"
@@ -127,7 +150,11 @@ def _variables(content: memoryview) -> Iterator[tuple[str, _Variable]]:
     if order is None or bytes(content[124:126]) != (b"\0\1" if order == "<" else b"\1\0"):
         raise Damaged("its header is not that of one")
     for element in elements(content[_HEADER:], order):
-        yield element.name, _Variable(element.kind, element.unpacked if element.kind == "numbers" else 0, element.read)
+        yield element.name, _Variable(element.kind, element.unpacked, element.read, _matrix(element))
+
+
+def _matrix(element: Element) -> Callable[[], tuple[memoryview, str]]:
+    return lambda: (element.body(), element.order)
 
 
 def _version_4(content: memoryview) -> Iterator[tuple[str, _Variable]]:

@@ -17,10 +17,29 @@ from svo.store.unpacking import check_unpacked
 ROWS = 1 << 15
 
 
-def write_parquet(path: Path, cells: Mapping[str, Array]) -> None:
-    """Write columns (K,) by name; NaN stays NaN."""
+def write_parquet(path: Path, cells: Mapping[str, Array], told: Mapping[str, str] | None = None) -> None:
+    """Write columns (K,) by name, and beside them what is ``told`` of them by key; NaN stays NaN."""
     arrow, parquet = _arrow()
-    parquet.write_table(arrow.table(dict(cells)), path, write_page_checksum=True, row_group_size=4 * ROWS)
+    table = arrow.table(dict(cells)).replace_schema_metadata(dict(told or {}))
+    parquet.write_table(table, path, write_page_checksum=True, row_group_size=4 * ROWS)
+
+
+def told_in(path: Path) -> dict[str, str]:
+    """What stands in a file beside its columns, by key."""
+    arrow, parquet = _arrow()
+    with path.open("rb") as file, _one_error(path, arrow):
+        found = parquet.ParquetFile(file).schema_arrow.metadata or {}
+        return {key.decode(): value.decode() for key, value in found.items()}
+
+
+def read_table(path: Path) -> Any:
+    """A file as a table of pyarrow, whatever its columns are."""
+    arrow, parquet = _arrow()
+    with path.open("rb") as file, _one_error(path, arrow):
+        source = parquet.ParquetFile(file, page_checksum_verification=True)
+        groups = range(source.metadata.num_row_groups)
+        check_unpacked(path, sum(source.metadata.row_group(i).total_byte_size for i in groups))
+        return source.read()
 
 
 def read_parquet(path: Path, columns: Columns, note: Note = noted, *, rows: int = ROWS) -> Iterator[Rows]:

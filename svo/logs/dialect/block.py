@@ -69,6 +69,13 @@ def block_of(source: Source, rows: list[int], rule: Times, marks: Marks, used: S
         local = date is not None and date.tzinfo is None and rule.zone is None
         return Block(source, rows, time, date is not None, local, "start and step", (), rule.columns)
     columns = [source.column(which) for which in rule.columns]
+    for which, column in zip(rule.columns, columns, strict=True):
+        other = next((value for value in used if source.size(value) != len(column)), None)
+        if other is not None:
+            raise ValueError(
+                f"{source.source}: {source.label(which)} has {len(column)} samples and {source.label(other)} has "
+                f"{source.size(other)}; expected times of the readings"
+            )
     called = " and ".join(source.label(which) for which in rule.columns)
     if len(columns) == 1 and isinstance(columns[0], np.ndarray):
         stamps = _of_numbers(source, columns[0], rows, rule, called)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from svo.logs.dialect.mat import read_mat_columns
+from svo.logs.dialect.parquet import read_parquet_columns
 from svo.logs.dialect.rules import Dialect
 from svo.logs.dialect.sheet import read_sheet
 from svo.logs.dialect.source import Source
@@ -18,5 +20,10 @@ def open_source(path: Path, dialect: Dialect) -> Source:
         If it is damaged, or not what its suffix says.
     OSError
         If it cannot be opened.
+    ImportError
+        If it needs a package that is not installed.
     """
-    return read_sheet(path, dialect)
+    suffix = path.suffix.lower()
+    if suffix == ".mat":
+        return read_mat_columns(path)
+    return read_parquet_columns(path) if suffix == ".parquet" else read_sheet(path, dialect)

@@ -39,6 +39,7 @@ NUMBERS = {
     "g08_restarted.csv": Numbers(28, "0 s", ((1.0, -0.996, 2.421), (2.0, 0.017, 2.656)), (0.8, 0.9)),
     "g09_bench_utf16.txt": Numbers(40, "2025-03-04 10:15:00 local time", (LONG[0], (3.0, -0.978, 2.2673)), (1.5, 1.6)),
     "g10_controller_rates.csv": Numbers(30, "0 s", (LONG[0], (2.0, 0.141, 1.1211)), (0.8, 2.1)),
+    "g11_scope.mat": Numbers(50, "0 s", LONG, (0.3, 3.7)),
     "g12_timetable_held.csv": Numbers(
         50, "0 s", ((1.0, 0.997, 0.18), (4.0, -0.279, 2.7)), tuple(k / 10 for k in range(50) if k % 2 or k == 18)
     ),
@@ -150,6 +151,13 @@ def test_a_fact_that_is_left_out_is_a_false_alarm(name: str, old: str, new: str,
         ),
         ("g09_bench_utf16.txt", 'missing = ["∞", "-∞"]', "", ["line 21", "'Position'", "'∞'", "missing"]),
         ("g10_controller_rates.csv", "column = 3", 'column = "sensors/position"', ["columns 3 and 6", "number"]),
+        ("g11_scope.mat", '"ScopeData.time"', '"tout"', ["tout has 491 samples", "has 50"]),
+        (
+            "g11_scope.mat",
+            "signals(2).values",
+            "signals(3).values",
+            ["no element 3", "ScopeData.time (50 x 1)", "'force [N]'", "'position [mm]'", "tout (491 x 1)"],
+        ),
         ("g12_timetable_held.csv", "held = 0.2", "held = 0.3", ["0.2 s", "0.6 s", "not held for 0.3 s"]),
     ],
 )
