@@ -15,7 +15,8 @@ from polytopes import kernel
 from polytopes.certificate import Certificate, HasRows, complete_certificate, exact_combination
 from polytopes.checks import Floats
 from polytopes.exact import ZERO, Multipliers, combine, to_floats
-from polytopes.linear_program import Program, prepare
+from polytopes.linear_program import Program
+from polytopes.preparation import prepare
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.exact import substituted
-from polytopes.linear_program import OPTIMAL, prepare_as_given
+from polytopes.linear_program import OPTIMAL
+from polytopes.preparation import prepare_as_given
 
 Oracle = Callable[[Floats], Floats]  # directions (k, n) -> a maximiser for each, (k, n)
 _EVEN = 0.05  # smallest spread of the support points at which the axes are good enough

@@ -14,11 +14,11 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from polytopes import kernel
-from polytopes.affine import AffineSet, affine_set
+from polytopes import kernel, large_program
+from polytopes.affine import AffineSet
 from polytopes.checks import Floats
 from polytopes.derived import derived
-from polytopes.duality import Bounds, multiplier_bounds, proved_reach
+from polytopes.duality import Bounds, proved_reach
 from polytopes.exact import rounded_up, to_floats
 from polytopes.exact_units import EvenRows, weights_of
 from polytopes.highs import HighsProgram
@@ -35,7 +35,6 @@ _SHARP = 1e-6  # the same gap, of the radius of a largest ball
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
 _SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
 _NOISE = 1e-15  # width, relative to the coordinates, that may be rounding
-_FARTHEST = 1e150  # distance of a hyperplane from the origin; the squares of coordinates beyond are no floats
 _EVEN_POWERS = 2  # exponents of two by which the units of the axes may differ from even ones
 _UNEVEN = 256.0  # ratio of the widths along two axes from which the axes are scaled
 
@@ -96,7 +95,7 @@ class _Solved:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Rows ``A x <= b``, ``C x = d`` prepared for linear programs; build it with `prepare`.
+    """Rows ``A x <= b``, ``C x = d`` prepared for linear programs; built by `polytopes.preparation`.
 
     Attributes
     ----------
@@ -167,17 +166,8 @@ class Program:
             z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), _WIDEST)
             if status == kernel.OPTIMAL:
                 return Interior(self.lift(z), z, radius, weights, True)
-        return self._interior_by_highs()
-
-    def _interior_by_highs(self) -> Interior:
-        (free, kept), cap = self.AT.shape, _WIDEST * self.size
-        rows = np.vstack([np.hstack([self.AT.T, self.norms[:, None]]), np.append(np.zeros(free), 1.0)])
-        answer = HighsProgram(rows, np.append(self.rhs, cap)).maximise(np.append(np.zeros(free), 1.0))
-        point = answer.point if answer.point.size == free + 1 else np.zeros(free + 1)
-        weights = answer.multipliers[:kept] if answer.multipliers.size == kept + 1 else np.zeros(kept)
-        radius = float(point[-1]) if point[-1] < 0.99 * cap else np.inf
-        z = point[:-1].copy()
-        return Interior(self.lift(z), z, radius, np.maximum(weights, 0.0), answer.status == "optimal")
+        z, radius, weights, reliable = large_program.largest_ball(self.AT, self.rhs, self.norms, _WIDEST * self.size)
+        return Interior(self.lift(z), z, radius, weights, reliable)
 
     @derived
     def thin(self) -> bool:
@@ -375,19 +365,9 @@ class Program:
         return _Solved(points, weights, Bounds(values, spare, beside), names)
 
     def _by_highs(self, reduced: Floats) -> tuple[Floats, Floats, Bounds, str]:
-        """Point, multipliers, bounds and status of one form by HiGHS, its multipliers refined on the rows they use."""
-        free, kept = self.AT.shape
-        answer = self._highs.maximise(reduced)
-        if answer.status != OPTIMAL:
-            status = UNBOUNDED if answer.status == "unbounded" else UNDECIDED
-            return np.zeros(free), np.zeros(kept), Bounds(np.full(1, np.inf), np.zeros(1), np.zeros((1, free))), status
-        y = np.maximum(answer.multipliers, 0.0)
-        used = np.flatnonzero(y > _CLEAN * y.max(initial=0.0))
-        refined = np.zeros(kept)
-        refined[used] = np.maximum(
-            y[used] + _least_squares(self.AT[:, used], reduced - self.AT[:, used] @ y[used]), 0.0
-        )
-        return answer.point, refined, multiplier_bounds(self.AT, self.rhs, reduced, refined), OPTIMAL
+        """Point, multipliers, bounds and status of one form."""
+        point, weights, bounds, status = large_program.support(self._highs, self.AT, self.rhs, reduced)
+        return point, weights, bounds, status if status in (OPTIMAL, UNBOUNDED) else UNDECIDED
 
     @derived
     def _exact_point(self) -> list[fmpq] | None:
@@ -447,70 +427,3 @@ class Program:
         more = error + np.maximum(lost, 0.0)
         total = np.where(more > 0.0, np.nextafter(total + more, np.inf), total)
         return np.where(np.isfinite(values), total, values)
-
-
-def prepare(A: Floats, b: Floats, C: Floats, d: Floats) -> Program:
-    """Eliminate the equalities, set constant rows aside and put the others into even units.
-
-    Parameters
-    ----------
-    A, b, C, d : arrays (m, n), (m,), (q, n), (q,)
-
-    Raises
-    ------
-    ValueError
-        If a hyperplane is too far from the origin, or units that even out the rows leave numbers that are no floats.
-    """
-    check_rounding()
-    units = None
-    if d.size:
-        row_units, units = kernel.exponents(np.vstack([A, C]), np.append(b, d))
-    flat = affine_set(C, d, units=units)
-    rows, rhs = flat.restrict(A, b)
-    AT, even, norms, row_powers, powers, kept, far, lost = kernel.scaled(rows, rhs)
-    _refuse_extremes(A, b, far, lost)
-    violated = None
-    if kept.size < b.size:
-        constant = np.setdiff1d(np.arange(b.size), kept)
-        violated = next((int(i) for i in constant if rhs[i] < 0.0), None)
-    if units is None:
-        units, row_units = powers, row_powers
-        if kept.size < b.size:
-            row_units = -np.frexp(b)[1].astype(np.int64)
-            row_units[kept] = row_powers
-    exact = EvenRows(A, b, flat, row_units[: b.size], units)
-    return Program(A, b, flat, exact, AT, even, norms, row_powers, powers, kept, violated)
-
-
-def prepare_as_given(A: Floats, b: Floats) -> Program:
-    """Rows whose coordinates are good as they are; only the rows are scaled."""
-    flat = affine_set(np.empty((0, A.shape[1])), np.empty(0))
-    lengths = np.linalg.norm(A, axis=1)
-    kept = np.flatnonzero(lengths)
-    row_powers, powers = -np.frexp(lengths)[1].astype(np.int64), np.zeros(A.shape[1], np.int64)
-    AT, even = np.ldexp(A[kept], row_powers[kept, None]).T, np.ldexp(b[kept], row_powers[kept])
-    norms = np.ldexp(lengths[kept], row_powers[kept])
-    violated = next((int(i) for i in np.flatnonzero(lengths == 0.0) if b[i] < 0.0), None)
-    exact = EvenRows(A, b, flat, row_powers, powers)
-    return Program(A, b, flat, exact, np.ascontiguousarray(AT), even, norms, row_powers[kept], powers, kept, violated)
-
-
-def _refuse_extremes(A: Floats, b: Floats, far: int, lost: int) -> None:
-    if far >= 0:
-        raise ValueError(
-            f"row {far} of A bounds {A[far].tolist()} x by {b[far]:.3g}, more than {_FARTHEST:g} from the origin; "
-            f"expected at most {_FARTHEST:g}. Use other units, or leave out a row that is not to bound."
-        )
-    if lost >= 0:
-        raise ValueError(
-            f"row {lost} of A, {A[lost].tolist()}, has entries of so different sizes that no units make floats of them "
-            "all. Leave out entries that do not matter."
-        )
-
-
-def _least_squares(A: Floats, b: Floats) -> Floats:
-    """A least-squares solution, zero if it is not found."""
-    try:
-        return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])
-    except np.linalg.LinAlgError:
-        return np.zeros(A.shape[1])

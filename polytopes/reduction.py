@@ -5,7 +5,8 @@ import heapq
 import numpy as np
 
 from polytopes.checks import Floats
-from polytopes.linear_program import OPTIMAL, prepare
+from polytopes.linear_program import OPTIMAL
+from polytopes.preparation import prepare
 from polytopes.rows import Rows
 
 

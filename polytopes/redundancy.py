@@ -9,7 +9,8 @@ from polytopes.checks import Floats
 from polytopes.exact import rational, rational_matrix, rational_vector
 from polytopes.exact_simplex import affordable
 from polytopes.frame import unit_body
-from polytopes.linear_program import Program, prepare
+from polytopes.linear_program import Program
+from polytopes.preparation import prepare
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty
 

@@ -11,8 +11,9 @@ from polytopes.checks import Floats, real_array
 from polytopes.derived import derived
 from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
-from polytopes.linear_program import Program, prepare
+from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
+from polytopes.preparation import prepare
 from polytopes.value import Value
 
 Table = tuple[Floats, Floats, Floats, Floats]

@@ -8,7 +8,7 @@ from polytopes.affine_hull import explicit
 from polytopes.checks import Floats
 from polytopes.errors import EmptySetError, UnboundedError
 from polytopes.frame import unit_frame
-from polytopes.linear_program import prepare_as_given
+from polytopes.preparation import prepare_as_given
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
 

@@ -118,6 +118,7 @@ CONSTANTS = (
     Constant("polytopes.linear_program", "_SMALL_BALL", "heuristic"),
     Constant("polytopes.linear_program", "_NOISE", "heuristic"),
     Constant("polytopes.linear_program", "_SHARP", "heuristic"),
+    Constant("polytopes.large_program", "_USED", "heuristic"),
     Constant("polytopes.certificate", "_ZERO_WEIGHT", "heuristic"),
     Constant("polytopes.frame", "_NOISE", "heuristic"),
     Constant("polytopes.hull", "_SLIVER", "heuristic"),

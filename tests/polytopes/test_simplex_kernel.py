@@ -8,7 +8,7 @@ from random_programs import KINDS, many
 
 from polytopes import HPolytope, kernel
 from polytopes.highs import HighsProgram
-from polytopes.linear_program import prepare
+from polytopes.preparation import prepare
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -16,7 +16,7 @@ from polytopes import HPolytope
 from polytopes.affine import affine_set
 from polytopes.duality import multiplier_bounds
 from polytopes.emptiness import strictly_inside
-from polytopes.linear_program import prepare
+from polytopes.preparation import prepare
 from svo.models.state_range import StateRange
 from svo.observers.polytope.vertex_images import hull_of_images
 from svo.observers.window.output_injection import OutputInjection
