@@ -1,4 +1,4 @@
-"""Every tolerance of the Python side, and the core's window's: what it is, and what must happen when it is changed.
+"""Every tolerance of Python and of the core: what it is, and what must happen when it is changed.
 
 An outward-rounding constant set to zero must fail a test of soundness with an adversarial input. A tolerance times 1000
 must fail a test of tightness; a heuristic one, which decides only how much work is done or how wide a set is, must
@@ -15,6 +15,7 @@ from tests.mutation.plugin import defined
 
 Kind = Literal["outward", "tolerance", "heuristic"]
 CORE = "tests/soundness_core"
+EPS = 2.0**-52
 
 
 @dataclass(frozen=True)
@@ -32,14 +33,15 @@ class Constant:
     @property
     def value(self) -> float:
         if "/" in self.module:
-            value = defined(self.module, self.name)
-            return float.fromhex(value) if "0x" in value else float(value)
+            value, _, unit = defined(self.module, self.name).partition(" * ")
+            return (float.fromhex(value) if "0x" in value else float(value)) * (EPS if unit else 1.0)
         return float(getattr(import_module(self.module), self.name))
 
     @property
     def changed(self) -> float:
-        """The value of the mutant."""
-        return 0.0 if self.kind == "outward" else 1000.0 * self.value
+        """The value of the mutant: a count stays one."""
+        value = 0.0 if self.kind == "outward" else 1000.0 * self.value
+        return round(value) if self.value > 1.0 and value.is_integer() else value
 
 
 ROUNDED = f"{CORE}/test_rounding_outward.py"
@@ -71,6 +73,35 @@ CONSTANTS = (
     ),
     Constant("core/window/factors.c", "UNIT", "outward", "tests/svo/observers/test_random_units.py"),
     Constant("core/window/window.h", "UNIT", "outward", f"{WINDOW}/test_chain.py"),
+    Constant("core/interval/predictor.c", "SLACK", "outward", "tests/svo/interval"),
+    Constant("core/polytopes/sums.h", "TINY", "outward", f"{SETS}/test_simplex_kernel.py"),
+    Constant("core/polytopes/facets.c", "TOLERANCE", "tolerance", f"{SETS}/test_row_redundancy.py"),
+    *(
+        Constant(f"core/{file}", name, "heuristic")
+        for file, names in {
+            "polytopes/simplex.c": (
+                "PIVOT",
+                "RAY",
+                "PRICE",
+                "CERTAIN",
+                "HARRIS",
+                "DEGENERATE",
+                "FREE_FIRST",
+                "REFACTOR",
+            ),
+            "polytopes/basis.c": ("RAY",),
+            "polytopes/facets.c": ("CLEAR", "BELOW", "FLAT_ROW", "RELAXED", "AWAY", "CLARKSON_FROM"),
+            "polytopes/clarkson.c": ("TOGETHER", "CORNERS", "FRESH"),
+            "polytopes/elimination.c": ("LONG", "GROWTH", "CANCELLED"),
+            "polytopes/centre.c": ("ROUNDED_SLACK",),
+            "polytopes/programs.c": ("CHAINED",),
+            "polytopes/scaling.c": ("SWEEPS", "STILL"),
+            "polytopes/sums.h": ("UNDERFLOW_BELOW",),
+            "window/factors.c": ("LEFT_OVER", "TOO_MUCH"),
+            "window/ratio_test.c": ("SMALL_PIVOT", "NO_PIVOT", "SAME"),
+        }.items()
+        for name in names
+    ),
     Constant("svo.residual_tests.threshold", "_ROUNDING", "outward", "tests/svo/residual_tests"),
     Constant("svo.interval.thresholds", "_EPS", "outward", "tests/svo/interval/test_rounding.py"),
     Constant("polytopes.outer_supports", "_EPS", "outward", f"{SETS}/test_outward.py"),

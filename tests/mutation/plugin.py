@@ -43,19 +43,23 @@ def _asked() -> tuple[str, str, str]:
 def defined(module: str, name: str) -> str:
     """The value of a constant of the core, as a file defines it or one of its headers does."""
     file = ROOT / module
-    own = re.search(rf"^#define {name} (\S+)", file.read_text("utf-8"), re.MULTILINE)
-    if own is None:
-        headers = sorted((*file.parent.glob("*.h"), *(ROOT / "core").glob("*.h")))
-        found = (re.search(rf"^#define {name} (\S+)", h.read_text("utf-8"), re.MULTILINE) for h in headers)
-        own = next((match for match in found if match), None)
-    if own is None:
+    headers = sorted((*file.parent.glob("*.h"), *(ROOT / "core").glob("*.h")))
+    found = (_definition(name).search(path.read_text("utf-8")) for path in (file, *headers))
+    match = next((match for match in found if match), None)
+    if match is None:
         raise AttributeError(f"{module} has no constant {name}")
-    return own.group(1)
+    return match["value"]
+
+
+def _definition(name: str) -> re.Pattern[str]:
+    """Of a constant: ``#define NAME value``, or ``static const double OTHER = value, NAME = value;``."""
+    variable = rf"static const (?:double|integer) (?:\w+ = [^,;]+, )*{name} = "
+    return re.compile(rf"^(?P<start>#define {name} |{variable})(?P<value>[^\s,;]+(?: \* EPS)?)", re.MULTILINE)
 
 
 def changed(text: str, name: str, value: str) -> str:
     """The text of a file in which a constant has another value: in its definition, or after its includes."""
-    text, count = re.subn(rf"^(#define {name}) \S+", rf"\1 {value}", text, flags=re.MULTILINE)
+    text, count = _definition(name).subn(lambda found: found["start"] + value, text)
     if count:
         return text
     at = list(INCLUDE.finditer(text))[-1].end()

@@ -168,3 +168,15 @@ def test_near_ties_do_not_displace_a_vertex() -> None:
         assert (result.points @ P.A.T - P.b).max() <= 1e-13
         np.testing.assert_allclose(result.multipliers @ P.b, result.values, rtol=0.0, atol=1e-13)
         assert (result.multipliers >= -1e-13).all()
+
+
+def test_bounds_hold_where_products_underflow() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        c, b = 1.0 + rng.random(), (1.0 + rng.random()) * 2.0**-1030
+        _, _, bounds, spare, beside, _, status = kernel.supports(
+            np.array([[1.0, -1.0]]), np.array([b, 1.0]), np.zeros(1), np.array([[c]])
+        )
+        exact = Fraction(c) * Fraction(b)
+        assert status[0] == kernel.OPTIMAL
+        assert exact <= Fraction(bounds[0]) - Fraction(spare[0]) + Fraction(beside[0, 0]) * Fraction(b)
