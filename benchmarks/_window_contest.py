@@ -59,7 +59,7 @@ class Recording:
 
 def record(observer: WindowObserver, log: Log) -> Recording:
     """Run a fresh observer once and keep what the other solvers need to solve the same windows."""
-    sample, memory = sampler(observer, log), observer._window.memory
+    sample, memory, form = sampler(observer, log), observer._window.memory, observer._form
     arrays, size = memory.arrays, memory.size
     queries, boxes, answers, slack = [], [], [], []
     new = arrays["new_upper"], arrays["new_lower"]
@@ -70,10 +70,10 @@ def record(observer: WindowObserver, log: Log) -> Recording:
         base, time = int(arrays["clock"][kernel.BASE]), int(arrays["clock"][kernel.TIME])
         programs = kernel.arrival_programs(memory.address)
         queries.append(Query(base, time, min(base + size.block, time), programs))
-        boxes.append((arrays["h_lower"].copy(), arrays["h_upper"].copy()))
+        boxes.append((arrays["h_lower"] * form.x, arrays["h_upper"] * form.x))
         bounds = time - base > size.N - size.block
-        answers.append(np.array([new[p % 2][p // 2] for p in programs]) if bounds else None)
-        slack.append(arrays["slack"][time % (size.N + 1)].copy())
+        answers.append(np.array([new[p % 2][p // 2] * form.x[p // 2] for p in programs]) if bounds else None)
+        slack.append(arrays["slack"][time % (size.N + 1)] * form.y)
     return Recording(log, size.N, queries, boxes, answers, np.array(slack))
 
 
