@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from polytopes.checks import Floats
 from polytopes.exact import ZERO, Multipliers, combine, power_of_two, rational, rational_matrix, refutes
+from polytopes.shown import Picture, Shown
 
 _ZERO_WEIGHT = 1e-13  # of the largest float multiplier: below, a row takes no part in a proof
 
@@ -28,7 +29,7 @@ class HasRows(Protocol):
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(Shown):
     """Multipliers ``lambda >= 0`` on ``A x <= b`` and free mu on ``C x = d`` that combine to ``0 <= negative``.
 
     Attributes
@@ -59,6 +60,19 @@ class Certificate:
             return 0.0
         ratio = -(bound + value) / total
         return int(ratio.p) / int(ratio.q)
+
+    def __repr__(self) -> str:
+        count = len(self.inequality) + len(self.equality)
+        return f"<Certificate: exact multipliers of {count} rows>"
+
+    def _picture(self) -> Picture:
+        rows = [*self.inequality.items(), *self.equality.items()]
+
+        def draw(ax: Any) -> None:
+            ax.stem([i for i, _ in rows], [int(v.p) / int(v.q) for _, v in rows])
+            ax.set(xlabel="row", ylabel="multiplier")
+
+        return Picture(draw)
 
     def to_dict(self) -> dict[str, dict[str, str]]:
         """A dict of strings that JSON can hold without loss: row number to ``"numerator/denominator"``."""

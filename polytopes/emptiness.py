@@ -17,10 +17,11 @@ from polytopes.checks import Floats
 from polytopes.exact import ZERO, Multipliers, combine, to_floats
 from polytopes.linear_program import Program
 from polytopes.preparation import prepare
+from polytopes.shown import Shown
 
 
 @dataclass(frozen=True, eq=False)
-class Emptiness:
+class Emptiness(Shown):
     """Answer to "is the set empty?".
 
     Attributes

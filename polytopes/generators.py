@@ -12,6 +12,7 @@ from polytopes.integers import floats_of_directions, floats_of_points, integer_r
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
 from polytopes.outward import float_rows
 from polytopes.rows import Rows, Table
+from polytopes.shown import Shown
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
 
@@ -19,7 +20,7 @@ _FEW = 200  # long points up to which a flat hull is found in integers
 
 
 @dataclass(frozen=True, eq=False)
-class Generators:
+class Generators(Shown):
     """``conv(vertices) + cone(rays) + span(lines)``: arrays (k, n), (r, n) and (l, n).
 
     With lines, the vertices and rays are those of the part of the set across the lines (some coordinates zero).

@@ -24,13 +24,14 @@ from polytopes.preimage import preimage
 from polytopes.product import product
 from polytopes.redundancy import minimal_rows
 from polytopes.rows import Rows, a_set, same_space
+from polytopes.shown import Picture, Shown
 from polytopes.signatures import options_by_name
 from polytopes.support import Ball, SupportResult
 from polytopes.vertices import vertices
 from polytopes.volume import volume
 
 
-class HPolytope(Rows):
+class HPolytope(Shown, Rows):
     """The polyhedron ``{x in R^n : A x <= b, C x = d}``.
 
     A value: its arrays are read-only copies of what was given, and every operation returns a new set.  Equalities are
@@ -120,6 +121,11 @@ class HPolytope(Rows):
     def __repr__(self) -> str:
         equalities = f", {self.d.size} equalities" if self.d.size else ""
         return f"HPolytope(dim={self.dim}, {self.b.size} inequalities{equalities})"
+
+    def _picture(self) -> Picture | None:
+        if not support_functions.known_nonempty(self):
+            return None
+        return Picture(lambda ax: plotting.draw_shadow(self, ax))
 
     # questions
 

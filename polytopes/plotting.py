@@ -69,9 +69,9 @@ def plot(P: Rows, ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list
     An unbounded set is cut at a box around what the axes show (or around its largest ball), a flat one is a face, a
     line or a point, and the empty set draws nothing.
     """
-    import matplotlib.pyplot as plt  # imported here: not every user draws
-
     if ax is None:
+        import matplotlib.pyplot as plt  # imported here: not every user draws
+
         ax = plt.figure().add_subplot(projection="3d" if len(dims) == 3 else None)
     if not known_nonempty(P):
         return []
@@ -80,6 +80,18 @@ def plot(P: Rows, ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list
     if len(dims) == 2:
         return _draw_polygon(ax, shadow(body, (dims[0], dims[1])), {"alpha": 0.4, **edge, **style})
     return _draw_faces(ax, Rows(*project(body, dims, "auto", _MAX_ROWS, False)), {"alpha": 0.4, **edge, **style})
+
+
+def draw_shadow(P: Rows, ax: Any, **style: Any) -> list[Any]:
+    """Draw the shadow of P on its first two coordinates, or P itself on a line; returns the artists."""
+    if P.dim > 1:
+        ax.set(xlabel="x[0]", ylabel="x[1]")
+        return plot(P, ax, (0, 1), style)
+    ax.set(xlabel="x[0]", yticks=[])
+    if not known_nonempty(P):
+        return []
+    (lower,), (upper,) = bounding_box(_cut(P, ax, (0,)))
+    return list(ax.plot([lower, upper], [0.0, 0.0], marker="|", linewidth=4.0, **{"alpha": 0.5, **style}))
 
 
 def _draw_polygon(ax: Any, outline: Floats, style: dict[str, Any]) -> list[Any]:

@@ -13,10 +13,11 @@ from polytopes.duality import equality_multipliers
 from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.linear_program import UNDECIDED, Maxima
 from polytopes.rows import Rows
+from polytopes.shown import Shown
 
 
 @dataclass(frozen=True, eq=False)
-class SupportResult:
+class SupportResult(Shown):
     """Support in k directions.
 
     Attributes
@@ -38,7 +39,7 @@ class SupportResult:
 
 
 @dataclass(frozen=True, eq=False)
-class Ball:
+class Ball(Shown):
     """A largest ball inside a set: centre (n,) and radius; the radius is inf if it can grow without end.
 
     The ball lies in the affine set of the explicit equalities.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect_shape, real_array
 
@@ -16,7 +17,7 @@ __all__ = ["DetectionIndices", "FirstAlarm", "detection_indices", "first_true", 
 
 
 @dataclass(frozen=True)
-class DetectionIndices:
+class DetectionIndices(Shown):
     """How well a Boolean decision told of a fault.
 
     Attributes
@@ -45,7 +46,7 @@ class DetectionIndices:
 
 
 @dataclass(frozen=True)
-class FirstAlarm:
+class FirstAlarm(Shown):
     """What the first alarm of a run tells of a fault: the one count of delays, in whole samples.
 
     Attributes

@@ -17,6 +17,7 @@ from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from svo.checks import Array, expect, expect_one_of
 from svo.faults import SensorFault
 from svo.isolation import ArchitectureI, ArchitectureII, Bank
@@ -76,7 +77,7 @@ def _description(fault: str, size: float) -> str:
 
 
 @dataclass(frozen=True)
-class Eclipse:
+class Eclipse(Shown):
     """The Eclipse UAV in closed loop about 37 m/s, with the faults of Rosa and Silvestre (2013), section 6.
 
     The observers' bounds are measured on these flights (`aircraft.eclipse.mismatch`): they promise nothing

@@ -12,6 +12,7 @@ from aircraft.elevator.gains import ServoGains
 from aircraft.elevator.scenarios import COMMANDS, DURATION, SCENARIOS, TRAVEL, TS, Scenario, SensorNoise
 from aircraft.elevator.servo import Servo
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from svo.checks import Array, chosen
 from svo.detectors.detector import Detector
 from svo.faults import ActuatorFault
@@ -58,7 +59,7 @@ def _faults() -> dict[str, tuple[str, ...]]:
 
 
 @dataclass(frozen=True)
-class Elevator:
+class Elevator(Shown):
     """The servo-loop of an elevator with runaway, jam, oscillation and loss of effect.
 
     Two detectors belong to it: the interval detector of the paper, learnt from fault-free records, and a bank of

@@ -15,6 +15,7 @@ from aircraft.missile.imu import DELAY, NOISE_SETS, SensorErrors
 from aircraft.missile.models import OUTPUTS, SCHEDULING, Block, Embedding, MeasuredSchedule, read_bounds, schedule_of
 from aircraft.missile.scenarios import DM, DN, ETA, TS, Fault, Flights, locked, noise_set, thrust_loss
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from svo.checks import Array
 from svo.faults import ActuatorFault, SensorFault, Step
 from svo.isolation import ArchitectureI, Bank
@@ -63,7 +64,7 @@ INITIAL = HPolytope.box([300.0, -200.0, -200.0], [900.0, 200.0, 200.0])
 
 
 @dataclass(frozen=True)
-class Missile:
+class Missile(Shown):
     """The surface-to-air missile of Marzat et al. (SysTol 2010) in closed loop, from 25 to 40 s of its flight.
 
     Rows of a log are of the instant two samples before they are received, inputs included. The observers' bounds are

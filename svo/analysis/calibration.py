@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.analysis.elastic_bounds import Bound, bounds_of
 from svo.analysis.elastic_program import ElasticProgram, Explained
@@ -26,7 +27,7 @@ _ROOM = 1e-6  # relative: of bounds that are wide enough while the first sample 
 
 
 @dataclass(frozen=True)
-class Widening:
+class Widening(Shown):
     """One bound that is too narrow.
 
     Attributes
@@ -49,7 +50,7 @@ class Widening:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Calibration(Shown):
     """Answer of `calibrate`.
 
     Attributes

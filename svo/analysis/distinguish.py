@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.analysis.model_pair import ModelPair, PairSolution, Witness
 from svo.models import UncertainModel
 
 
 @dataclass(frozen=True)
-class Distinguishability:
+class Distinguishability(Shown):
     """Answer of `distinguishability`.
 
     Attributes

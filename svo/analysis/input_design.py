@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.model_pair import LEAST_SEPARATION, ModelPair
@@ -37,7 +38,7 @@ _BACKTRACKS = 6
 
 
 @dataclass(frozen=True)
-class InputDesign:
+class InputDesign(Shown):
     """Answer of `design_input`.
 
     Attributes

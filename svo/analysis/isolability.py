@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.checks import Array, expect
 from svo.logs.drive import drive
@@ -33,7 +34,7 @@ class StatesFaults(Protocol):
 
 
 @dataclass(frozen=True)
-class Isolability:
+class Isolability(Shown):
     """Every stated fault of a plant against every observer of its bank, along one flight without a fault.
 
     Attributes

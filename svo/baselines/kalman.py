@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.baselines.filter_kernel import filter_samples
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, Sample
@@ -20,7 +21,7 @@ _UNSEEN = 1e-9  # of |A|: singular value of a mode that the outputs do not see
 
 
 @dataclass(frozen=True)
-class Innovations:
+class Innovations(Shown):
     """Residuals over K samples.
 
     Attributes
@@ -43,7 +44,7 @@ class Innovations:
 
 @options_by_name
 @dataclass(frozen=True)
-class InnovationFilter:
+class InnovationFilter(Shown):
     """Kalman filter; with ``state_input`` or ``output_input`` an unknown-input observer of least variance.
 
     The unknown inputs are estimated from the innovation and take all of it that they can explain (Kitanidis,

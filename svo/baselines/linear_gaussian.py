@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from svo.checks import Array, bounded_box
 from svo.logs.log import Log
 from svo.models import UncertainModel
@@ -27,7 +28,7 @@ class Sample(NamedTuple):
 
 
 @dataclass(frozen=True)
-class GaussianSamples:
+class GaussianSamples(Shown):
     """The model along a log of K samples: A (K, n, n), f (K, n), Q (K, n, n), C (K, ny, n), g (K, ny), R (K, ny, ny),
     and the measurements y (K, ny)."""
 
@@ -48,7 +49,7 @@ class GaussianSamples:
 
 
 @dataclass(frozen=True)
-class GaussianModel:
+class GaussianModel(Shown):
     """A linear (parameter-varying) model with Gaussian noise.
 
     Variances are those of uniform variables within the bounds of the uncertain model, disturbances have the mean

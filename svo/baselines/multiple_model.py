@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.baselines.filter_kernel import multiple_models
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
@@ -15,7 +16,7 @@ from svo.logs.log import Log
 
 
 @dataclass(frozen=True)
-class ModelProbabilities:
+class ModelProbabilities(Shown):
     """Over K samples: posterior (K, m) of the models, by ``names``, and log_odds (K,) of all but the first together."""
 
     names: tuple[str, ...]
@@ -25,7 +26,7 @@ class ModelProbabilities:
 
 @options_by_name
 @dataclass(frozen=True)
-class MultipleModelFilter:
+class MultipleModelFilter(Shown):
     """One Kalman filter a model, and the probability of each (Blom and Bar-Shalom 1988).
 
     Parameters

@@ -8,6 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples
 from svo.checks import Array, expect, is_count, positive_number
@@ -18,7 +19,7 @@ _BLOCK = 512  # windows at a time: some megabytes
 
 
 @dataclass(frozen=True)
-class ParityRecord:
+class ParityRecord(Shown):
     """Over K samples, NaN while there are too few.
 
     Attributes
@@ -38,7 +39,7 @@ class ParityRecord:
 
 @options_by_name
 @dataclass(frozen=True)
-class ParitySpace:
+class ParitySpace(Shown):
     """Residuals of the last order + 1 measurements that no state can make.
 
     Stacked, y = O x + known + noise with the state x at the start of the window. The parity vector is what is

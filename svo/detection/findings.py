@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from polytopes.shown import Shown, in_a_line
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
 from svo.interval.on_log import ThresholdDetection
 from svo.isolation import Alarm, write_alarms
@@ -25,7 +26,7 @@ class ChangeAt(NamedTuple):
     alive: tuple[str, ...]
 
 
-class Findings(ABC):
+class Findings(Shown, ABC):
     """What a plant's bank found in a log; printed, it says what ``svo detect`` says.
 
     Attributes
@@ -139,8 +140,8 @@ class Findings(ABC):
         return "\n".join(line(text) for text in self._lines())
 
     def __repr__(self) -> str:
-        said = line(next(self._lines()))
-        return f"<{type(self).__name__} of {self.plant.name!r:.40}, {self.samples} samples: {said:.200}>"
+        about = f"{self.plant.name!r:.60}, {self.samples} samples"
+        return in_a_line(f"<{type(self).__name__} of {about}: {next(self._lines())}>")
 
     def _lines(self) -> Iterator[str]:
         yield from self._conclusion()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Picture
 from polytopes.signatures import options_by_name
 from svo.detection.findings import ChangeAt, Findings
 from svo.interval.on_log import ThresholdDetection
@@ -102,6 +103,9 @@ class Detection(Findings):
         first = [0, *(np.flatnonzero((alive[1:] != alive[:-1]).any(axis=1)) + 1).tolist()]
         said = sorted({*first, *(k for k in range(1, len(states)) if states[k] != states[k - 1])})
         return tuple(ChangeAt(float(self.time[k]), states[k], self._alive(k)) for k in said)
+
+    def _picture(self) -> Picture:
+        return self.record._picture()
 
     def _at(self, sample: int | None) -> float | None:
         return None if sample is None else float(self.time[sample])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from polytopes.shown import Shown, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import expect_kind
 from svo.detection.chains import PlantModels, with_chains
@@ -22,7 +23,7 @@ _SHOWN = 20  # failed checks
 
 
 @dataclass(frozen=True, repr=False)
-class Verification:
+class Verification(Shown):
     """What came of checking alarms; printed, it says what ``svo verify`` says.
 
     Attributes
@@ -73,7 +74,7 @@ class Verification:
         return "\n".join(line(text) for text in (*self.failures, self.summary))
 
     def __repr__(self) -> str:
-        return f"<Verification of {line(self.summary):.300}>"
+        return in_a_line(f"<Verification of {self.summary}>")
 
 
 def _which(check: AlarmCheck) -> str:

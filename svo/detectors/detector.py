@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Shown
 from svo.logs.log import Log
 
 Kind = Literal["falsification", "threshold"]
@@ -16,7 +17,7 @@ NOBODY = -1  # in `Detection.isolated`: no fault is named
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(Shown):
     """The range in which the optimiser looks for an inner parameter.
 
     Attributes
@@ -50,7 +51,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Setting:
+class Setting(Shown):
     """Everything that tuning decides about a detector; plain numbers and arrays, so it travels between processes.
 
     Attributes
@@ -70,7 +71,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Detection:
+class Detection(Shown):
     """What a detector says over a log of K samples.
 
     Attributes

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Shown
 from svo.baselines.kalman import InnovationFilter
 from svo.baselines.linear_gaussian import GaussianModel, GaussianSamples, fault_effect
 from svo.baselines.multiple_model import MultipleModelFilter
@@ -25,7 +26,7 @@ CONFIDENT = 0.95  # share of the faults' probability that isolates one of them
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class Evaluated(Shown):
     """A log along the fault-free model, and along that of each fault at one size."""
 
     nominal: GaussianSamples

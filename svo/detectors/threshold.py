@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.checks import Array
 from svo.detectors.detector import Detection, Kind, Parameter, Setting
 from svo.logs.log import Log
 from svo.residual_tests.interface import above
 
 
-class ThresholdDetector(ABC):
+class ThresholdDetector(Shown, ABC):
     """A `svo.detectors.detector.Detector` by a score; subclasses say what the score of each sample is.
 
     The score is NaN where there is none yet, and never an alarm there.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from svo.checks import Array, real_array
 from svo.detectors.detector import NOBODY, Detection, Kind, Parameter, Setting
 from svo.detectors.scaled_bounds import scaled_bounds
@@ -25,7 +26,7 @@ PRECISION = 0.02  # relative, of a critical scale
 
 
 @dataclass(frozen=True)
-class WindowBank:
+class WindowBank(Shown):
     """Architecture I of window observers; its level is the factor on the bounds of noise and disturbances.
 
     At level 1 and above, within the stated bounds, an alarm is a proof. Below 1 it is no more than a

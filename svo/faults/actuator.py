@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_one_of, finite_array, is_count, is_finite_number, positive_number
 from svo.faults.blocks import (
@@ -32,7 +33,7 @@ _WITHOUT_MAGNITUDE = ("locking", "floating")
 
 
 @dataclass(frozen=True)
-class ActuatorLaw:
+class ActuatorLaw(Shown):
     """The achieved deflection of a faulty actuator at given times, from the command and the deflection held.
 
     achieved = clip(gain command + hold held + offset, lower, upper), where ``held`` is the deflection
@@ -48,7 +49,7 @@ class ActuatorLaw:
 
 @options_by_name
 @dataclass(frozen=True)
-class ActuatorFault:
+class ActuatorFault(Shown):
     """A fault of one actuator, or of several that fail together. Inputs are ABSOLUTE (trim included).
 
     With u the command, p = profile.value(t), h the deflection achieved when the fault began, and

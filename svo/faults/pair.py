@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from polytopes.shown import Shown
 from svo.faults.actuator import ActuatorFault
 from svo.faults.blocks import channels
 from svo.faults.plant import PlantFault
@@ -16,7 +17,7 @@ Fault = ActuatorFault | PlantFault | SensorFault
 
 
 @dataclass(frozen=True)
-class FaultPair:
+class FaultPair(Shown):
     """Two faults that act together.
 
     Where both act on one channel the first acts first: of two actuator faults the second one moves what the

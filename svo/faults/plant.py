@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.shown import Shown
 from svo.checks import Array, expect, expect_kind, finite_array, is_finite_number
 from svo.faults.profiles import Profile, check_profile
 from svo.models import UncertainModel, Uncertainty
 
 
 @dataclass(frozen=True)
-class PlantFault:
+class PlantFault(Shown):
     """A change of the plant along given directions.
 
     At time t the plant gains delta(t) (A_i x + B_i u + a_i + E_i w) in its state equation and

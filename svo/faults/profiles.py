@@ -13,6 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.shown import Shown
 from svo.checks import Array, expect, expect_kind, finite_array, is_finite_number, positive_number, readings, real_array
 
 EDGE_TOLERANCE_S = 1e-9
@@ -33,7 +34,7 @@ class Profile(Protocol):
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(Shown):
     """Abrupt fault: 0 before ``start`` [s], 1 from it on."""
 
     start: float = 0.0
@@ -47,7 +48,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Ramp:
+class Ramp(Shown):
     """Incipient fault: grows linearly from 0 at ``start`` [s] to 1 after ``duration`` [s], then stays."""
 
     start: float
@@ -63,7 +64,7 @@ class Ramp:
 
 
 @dataclass(frozen=True)
-class Exponential:
+class Exponential(Shown):
     """Incipient fault: 1 - exp(-(t - start) / time_constant), both in seconds."""
 
     start: float
@@ -79,7 +80,7 @@ class Exponential:
 
 
 @dataclass(frozen=True)
-class Intermittent:
+class Intermittent(Shown):
     """On for the first ``duty`` (0 < duty < 1) of every ``period`` [s] from ``start`` [s] on, off otherwise."""
 
     start: float

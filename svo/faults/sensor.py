@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.shown import Shown
 from svo.checks import Array, expect_one_of, is_finite_number
 from svo.faults.blocks import channels, mapped, only_columns, only_rows, product_of, with_noise
 from svo.faults.profiles import Profile, at_times, check_profile
@@ -17,7 +18,7 @@ SensorKind = Literal["bias", "drift", "scaling", "hard"]
 
 
 @dataclass(frozen=True)
-class SensorLaw:
+class SensorLaw(Shown):
     """The reading of a faulty sensor at given times: ``gain`` times the healthy reading plus ``offset``."""
 
     gain: Array
@@ -25,7 +26,7 @@ class SensorLaw:
 
 
 @dataclass(frozen=True)
-class SensorFault:
+class SensorFault(Shown):
     """A fault of one sensor, or of several that fail together.
 
     With y0 the healthy reading (noise included) and p = profile.value(t) the faulty one is

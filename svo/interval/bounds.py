@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, real_array
 
 
 @options_by_name
 @dataclass(frozen=True, slots=True)
-class GainBounds:
+class GainBounds(Shown):
     """Intervals of g and h in x+ = g x + (1 - g) h u, at one sample or at K samples.
 
     g lies in ``gc +- min(gr + slope |hc u - xc|, limit)`` with xc the centre of the prediction, and h in hc +- hr. The

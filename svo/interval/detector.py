@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_kind, expect_shape, real_array
 from svo.interval.noise import NoiseCharacterization
@@ -24,7 +25,7 @@ to what was learnt (7). It is never "falsified", carries no certificate, and no 
 
 
 @dataclass(frozen=True, slots=True)
-class IntervalStep:
+class IntervalStep(Shown):
     """Answer of an `IntervalDetector` at one sample.
 
     Attributes
@@ -67,7 +68,7 @@ class IntervalStep:
 
 
 @dataclass(frozen=True, eq=False)
-class IntervalRecord:
+class IntervalRecord(Shown):
     """A detector's run over a log of K samples.
 
     Attributes
@@ -103,7 +104,7 @@ class IntervalRecord:
         return float(times[hits[0]]) if hits.size else None
 
 
-class IntervalDetector:
+class IntervalDetector(Shown):
     """Detects when the filtered dead-zone residual leaves the band that the characterised noise allows.
 
     Parameters

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.checks import Array, expect
 from svo.interval.bounds import GainBounds
 from svo.logs.log import Log
@@ -19,7 +20,7 @@ _LEAST = 50  # samples, the farthest, if fewer are that far
 
 
 @dataclass(frozen=True, eq=False)
-class FirstOrderFit:
+class FirstOrderFit(Shown):
     """A pole g and a static gain h with bounds, x+ = g x + (1 - g) h u.
 
     Attributes

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.checks import Array
 from svo.interval.predictor import IntervalPrediction, IntervalPredictor
 from svo.logs.log import Log
@@ -76,7 +77,7 @@ def first_order_schedule(prediction: IntervalPrediction) -> Log:
     return Log(time=p.time, u=p.u[:, None], y=p.y[:, None], schedule=schedule)
 
 
-class FirstOrderScheduler:
+class FirstOrderScheduler(Shown):
     """The schedule of `first_order_model` sample by sample, by a predictor that runs along (a `svo.plant.Scheduler`).
 
     Parameters

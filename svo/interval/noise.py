@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes.native import Address, Entries, Given, Integer, function, scratch
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, real_array
 from svo.interval.power_law import DEFAULT_EXPONENTS, PowerLaw, smallest_power_law
@@ -19,7 +20,7 @@ _extreme_sums_room = function("fdi_extreme_sums_room", Integer, returns=Integer)
 
 
 @dataclass(frozen=True, eq=False)
-class CharacterizationCheck:
+class CharacterizationCheck(Shown):
     """Whether other records keep to a characterisation: assumption (7), q by q.
 
     Attributes
@@ -50,7 +51,7 @@ class CharacterizationCheck:
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseCharacterization:
+class NoiseCharacterization(Shown):
     """Bounds lambda_q of a signal's moving averages over q = 1..qbar samples.
 
     Attributes

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.interval.detector import IntervalDetector, IntervalRecord
 from svo.logs.log import Log
 
 
 @dataclass(frozen=True, eq=False)
-class ThresholdDetection:
+class ThresholdDetection(Shown):
     """What an interval detector said about a log: threshold crossings, which are no falsifications.
 
     Attributes

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.shown import Shown
 from svo.checks import Array, expect_shape, finite_array
 from svo.interval.thresholds import checked_bounds
 
@@ -14,7 +15,7 @@ DEFAULT_EXPONENTS: tuple[float, ...] = tuple(np.round(np.arange(-2.0, 0.0, 0.05)
 
 
 @dataclass(frozen=True)
-class PowerLaw:
+class PowerLaw(Shown):
     """alpha q^gamma + beta, with alpha >= 0."""
 
     alpha: float

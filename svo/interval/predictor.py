@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect_shape, is_finite_number, real_number
 from svo.interval import kernel
@@ -39,7 +40,7 @@ class Interval(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class IntervalPrediction:
+class IntervalPrediction(Shown):
     """A prediction over a log of K samples, row k about the state at ``time[k]``.
 
     Attributes
@@ -79,7 +80,7 @@ class IntervalPrediction:
         return dead_zone(self.y, self.lower, self.upper)
 
 
-class IntervalPredictor:
+class IntervalPredictor(Shown):
     """Interval predictor of one state; it uses inputs only, measurements at most to choose the bounds.
 
     Parameters

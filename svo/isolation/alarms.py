@@ -17,6 +17,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from polytopes.shown import Shown
 from svo.logs.log import Log
 from svo.observers.certificate import Certificate
 from svo.observers.polytope.certificate import PolytopeCertificate
@@ -34,7 +35,7 @@ _ENTRIES = {"format", "kind", "observer", "sample", "time", "source", "certifica
 
 
 @dataclass(frozen=True, eq=False)
-class Alarm:
+class Alarm(Shown):
     """A model that was falsified, and why.
 
     Attributes
@@ -62,7 +63,7 @@ class Alarm:
 
 
 @dataclass(frozen=True)
-class AlarmCheck:
+class AlarmCheck(Shown):
     """Result of checking one stored alarm; ``reason`` says what was proven, or what is wrong."""
 
     line: int

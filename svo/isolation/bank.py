@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.shown import Picture, Shown, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_kind, expect_shape, is_count, is_finite_number
 from svo.isolation.bank_checks import check_observers
@@ -26,9 +27,10 @@ from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models import Labels
 from svo.observers.base import Observer, Step
+from svo.pictures.sets import picture_of_sets
 
 
-class Bank(ABC):
+class Bank(Shown, ABC):
     """A nominal observer and one observer a fault, driven together; `ArchitectureI` and `ArchitectureII` are banks.
 
     Attributes
@@ -47,6 +49,18 @@ class Bank(ABC):
         self._untimed = tuple(n for n, o in observers.items() if not o.takes_deadline)
         check_observers(self.observers, same_states)
         self._forget()
+
+    def __repr__(self) -> str:
+        state = self._state.state
+        where = "before its first sample" if self._sample is None else f"at sample {self._sample}: {state}"
+        names = ", ".join(self.observers)
+        return in_a_line(f"<{type(self).__name__} of {names:.200} {where}>")
+
+    def _picture(self) -> Picture | None:
+        newest = {name: o._newest for name, o in self._running.items() if o._newest is not None}
+        sets = {name: step.set for name, step in newest.items() if step.sample == self._running[name]._number}
+        labels = Labels.of(self.observers[NOMINAL].model)
+        return picture_of_sets(sets, self.names, labels.state_titles[:2])
 
     # -- samples -----------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Picture, Shown, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import Array, optional_import
 from svo.isolation.logic import NOMINAL, StateName
@@ -17,6 +18,7 @@ from svo.logs.log import Log
 from svo.models import Labels
 from svo.observers.base import Certificate, Step
 from svo.observers.record import panels_of, runs
+from svo.pictures.sets import picture_of_sets
 from svo.pictures.style import INK, colours, in_seconds
 from svo.pictures.timeline import Lane, Span, Timeline
 
@@ -24,11 +26,12 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
+_SHOWN = 20_000  # samples: a notebook that shows a longer record does not wait for boxes that nobody asked for
 _STATES = {"nominal": "#8A929B", "detected": "#E69F00", "isolated": "#D55E00", "unexplained": INK}
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(Shown):
     """The bank's conclusion at one sample.
 
     Attributes
@@ -61,9 +64,21 @@ class Verdict:
         """Programs of its steps that ended at a limit, as `Observer.stopped`."""
         return sum(step.stopped for step in self.steps.values())
 
+    def __repr__(self) -> str:
+        fault = f", {self.fault}" if self.fault else ""
+        since = {"detected": self.detected_at, "isolated": self.isolated_at}
+        when = "".join(f"; {what} at {at}" for what, at in since.items() if at is not None)
+        alive = ", ".join(self.alive) or "no model"
+        return in_a_line(f"<Verdict at sample {self.sample}: {self.state}{fault}; alive: {alive}{when}>")
+
+    def _picture(self) -> Picture | None:
+        sets = {name: step.set for name, step in self.steps.items() if step.verdict != "falsified"}
+        n = max((step.n for step in self.steps.values()), default=0)
+        return picture_of_sets(sets, list(self.steps), [f"x[{i}]" for i in range(n)][:2])
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BankRecord:
+class BankRecord(Shown):
     """A run of a bank over a log of K samples; columns in the order of ``names``.
 
     Attributes
@@ -155,10 +170,7 @@ class BankRecord:
         -------
         list of Artist
         """
-        tone = colours(self.names)
-        bounds = {tone[name]: self.boxes[name] for name in self.names}
-        panels = panels_of(self.log, self.labels, bounds, channels)
-        return Timeline(self.time, list(self._lanes(tone)), panels, self._marks()).draw(ax)
+        return self._timeline(channels, self.boxes).draw(ax)
 
     def to_dataframe(self) -> Any:
         """A `pandas.DataFrame`, a row a sample: time, state of the bank, readings; of each model life and bounds."""
@@ -174,7 +186,18 @@ class BankRecord:
     def __repr__(self) -> str:
         alive = ", ".join(self.verdict.alive)
         found = "; ".join(self._marks().values()) or "no fault"
-        return f"<BankRecord of {len(self.states)} samples: {found}; alive: {alive:.120}>"
+        return in_a_line(f"<BankRecord of {len(self.states)} samples: {found}; alive: {alive:.120}>")
+
+    def _picture(self) -> Picture:
+        known = len(self.time) <= _SHOWN or self.replay.known
+        timeline = self._timeline(None, self.boxes if known else {})
+        return Picture(timeline.draw, timeline.width, timeline.height)
+
+    def _timeline(self, channels: Sequence[str] | None, boxes: Mapping[str, tuple[Array, Array]]) -> Timeline:
+        tone = colours(self.names)
+        bounds = {tone[name]: boxes[name] for name in self.names if name in boxes}
+        panels = panels_of(self.log, self.labels, bounds, channels)
+        return Timeline(self.time, list(self._lanes(tone)), panels, self._marks())
 
     def _marks(self) -> dict[int, str]:
         marks: dict[int, list[str]] = {}
@@ -200,6 +223,11 @@ class Replay:
 
     def __init__(self, boxes: Callable[[], Mapping[str, tuple[Array, Array]]]) -> None:
         self._compute: Callable[[], Mapping[str, tuple[Array, Array]]] | None = boxes
+
+    @property
+    def known(self) -> bool:
+        """Whether they were asked for before."""
+        return "boxes" in self.__dict__
 
     @cached_property
     def boxes(self) -> Mapping[str, tuple[Array, Array]]:

@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Picture, Shown, counted, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect_kind, expect_shape, readings, real_array, sizes
 from svo.logs import frames
 from svo.logs.columns import checked_parts
 from svo.logs.names import Columns
+from svo.pictures.timeline import Panel, Timeline
 
 
 @options_by_name
 @dataclass(frozen=True, eq=False)
-class Log:
+class Log(Shown):
     """Samples of one run; row k holds what is known of time ``time[k]``.
 
     Attributes
@@ -68,6 +70,20 @@ class Log:
 
     def __len__(self) -> int:
         return int(self.time.size)
+
+    def __repr__(self) -> str:
+        span = f", {self.time[0]:g} to {self.time[-1]:g} s" if len(self) else ""
+        counts = counted({"input": self.u.shape[1], "output": self.y.shape[1]})
+        others = "".join(f", {name}" for name in ("x", "schedule") if getattr(self, name) is not None)
+        source = f"; from {self.source!r}" if self.source else ""
+        return in_a_line(f"<Log of {len(self)} samples{span}: {counts}{others}{source}>")
+
+    def _picture(self) -> Picture | None:
+        if len(self) == 0:
+            return None
+        panels = [Panel(f"{name}[{i}]", truth=u) for name, us in (("u", self.u),) for i, u in enumerate(us.T)]
+        timeline = Timeline(self.time, [], panels + [Panel(f"y[{i}]", readings=y) for i, y in enumerate(self.y.T)])
+        return Picture(timeline.draw, timeline.width, timeline.height)
 
     def schedule_at(self, k: int) -> float | Array | None:
         """Scheduling value of sample k, or None where the log has none."""

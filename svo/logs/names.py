@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 
 
 @dataclass(frozen=True)
-class Column:
+class Column(Shown):
     """One channel of a log file: its column name and the unit of the numbers in it."""
 
     name: str
@@ -28,7 +29,7 @@ class Column:
 
 @options_by_name
 @dataclass(frozen=True)
-class Columns:
+class Columns(Shown):
     """Column names of a log: time [s], then inputs, outputs and states in the model's order and units."""
 
     inputs: tuple[Column, ...]

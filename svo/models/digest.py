@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.checks import Array
 from svo.models.model import UncertainModel
 from svo.store.values import encode_value
@@ -24,7 +25,7 @@ Options = Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class ModelSample:
+class ModelSample(Shown):
     """Matrices and bounds of a model at one sample.
 
     Attributes

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.checks import expect
 from svo.logs.names import Column, Columns
 from svo.models.model import UncertainModel
 
 
 @dataclass(frozen=True)
-class Labels:
+class Labels(Shown):
     """Names of states and outputs.
 
     Attributes

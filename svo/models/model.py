@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
+from polytopes.shown import Picture, Shown, counted
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect_kind, expect_shape, finite_array, listed, positive_number
 from svo.logs.log import Log
@@ -27,6 +28,7 @@ from svo.models.discretisation import check_constant
 from svo.models.draws import draw, draw_mixture
 from svo.models.mat import read_model
 from svo.models.origin import Origin
+from svo.models.responses import picture_of_responses
 from svo.models.schedule_table import ScheduleTable
 from svo.models.stack import Layout, Stack, may_be_nonzero
 from svo.models.state_range import StateRange, start_range, state_range
@@ -40,7 +42,7 @@ _TYPICAL = -1.0  # the sample before the first stands for the typical schedule, 
 
 @options_by_name
 @dataclass(frozen=True, eq=False)
-class UncertainModel:
+class UncertainModel(Shown):
     """An uncertain linear (parameter-varying) model in discrete time.
 
     Parameters
@@ -157,6 +159,14 @@ class UncertainModel:
     def disturbance_polytope(self) -> HPolytope | None:
         """The disturbance set, where it was given as a polytope."""
         return self.w if isinstance(self.w, HPolytope) else None
+
+    def __repr__(self) -> str:
+        sizes = {"state": self.n_states, "input": self.n_inputs, "output": self.n_outputs}
+        sizes |= {"disturbance": self.n_disturbances, "uncertainty": len(self.uncertainties)}
+        return f"<UncertainModel of {counted(sizes)}; Ts = {self.Ts:g} s{', scheduled' if self.is_scheduled else ''}>"
+
+    def _picture(self) -> Picture:
+        return picture_of_responses(self.stack(self.schedule)[0], self.n_states, self.n_inputs, self.Ts)
 
     # -- evaluation ----------------------------------------------------------------------------
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
+from polytopes.shown import Shown
 from polytopes.value import Value
 from svo.checks import Array
 from svo.models.bounds import Bounds
@@ -36,7 +37,7 @@ _SURELY_SCALED = ENORMOUS * 2.0**-_LARGEST
 
 
 @dataclass(frozen=True, eq=False)
-class Exponents:
+class Exponents(Shown):
     """Of the units 2^e of the states (n,), inputs (nu,), outputs (ny,) and disturbances (nw,)."""
 
     states: Integers
@@ -76,7 +77,7 @@ def power(exponents: Integers) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class NormalForm:
+class NormalForm(Shown):
     """A model in its normal form, and what carries numbers over.
 
     Attributes

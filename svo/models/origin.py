@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Shown
 from svo.checks import Array, finite_array
 from svo.models.discretisation import (
     Plant,
@@ -29,7 +30,7 @@ _ALIKE_IN_BOTH_TIMES = frozenset({"C", "D", "c", "n", "names", "physical", "larg
 
 
 @dataclass(frozen=True, eq=False)
-class Origin:
+class Origin(Shown):
     """The continuous plant that a discrete model was made from.
 
     Attributes

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.shown import Shown
 from svo.checks import Array, finite_array, floats, real_number
 
 
@@ -27,7 +28,7 @@ def values_over(value: Any, schedule: Array) -> Array:
     return np.array([floats("an array at a schedule", value(float(at) if at.ndim == 0 else at)) for at in schedule])
 
 
-class ScheduleTable:
+class ScheduleTable(Shown):
     """A function of a scalar schedule by linear interpolation; usable wherever a model takes a function.
 
     A model whose scheduled arrays are all tables over the same points evaluates them together, with one

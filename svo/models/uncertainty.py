@@ -8,6 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import finite_array
 
@@ -16,7 +17,7 @@ Schedulable = ArrayLike | Callable[[Any], ArrayLike] | None
 
 @options_by_name
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Uncertainty:
+class Uncertainty(Shown):
     """One Delta and the directions that it scales: any of A, B, a, E (state) and C, D, c, F (output).
 
     ``bounds`` = (lo, hi) are used as given, never recentred. Each array is constant, a function of the

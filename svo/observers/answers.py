@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
+from polytopes.shown import Picture, Shown, in_a_line
 from svo.checks import Array
 from svo.observers.certificate import Certificate
 from svo.observers.data import directions_of
+from svo.pictures.sets import picture_of_sets
 
 VerdictName = Literal["consistent", "falsified", "undecided"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Step(ABC):
+class Step(Shown, ABC):
     """The answer of an observer at one sample; a frozen dataclass.
 
     A kind of its own defines `n` and `_box`, and `_set` or `_support` where it knows more than a box.
@@ -53,6 +55,15 @@ class Step(ABC):
     @abstractmethod
     def n(self) -> int:
         """Number of states."""
+
+    def __repr__(self) -> str:
+        why = f", {self.reason}" if self.reason else ""
+        return in_a_line(f"<{type(self).__name__} at sample {self.sample}: {self.verdict}{why}>")
+
+    def _picture(self) -> Picture | None:
+        if self.verdict == "falsified":
+            return None if self.certificate is None else self.certificate._picture()
+        return picture_of_sets({"set": self.set}, ["set"], [f"x[{i}]" for i in range(self.n)][:2])
 
     @property
     def box(self) -> tuple[Array, Array]:

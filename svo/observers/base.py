@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes import HPolytope
 from polytopes.rounding import check_rounding
+from polytopes.shown import Picture, Shown, brief, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import Array, is_count
 from svo.logs.drive import drive
@@ -40,7 +41,7 @@ __all__ = ["Certificate", "Observer", "Record", "Seen", "Step", "VerdictName"]
 _UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, RecursionError)  # by arrays that fit no observer
 
 
-class Observer(ABC):
+class Observer(Shown, ABC):
     """The set of states that a model and the data so far allow, sample by sample.
 
     A kind of its own defines `_reset`, `_update` and `_step`, and the hooks of what else it declares that it can do.
@@ -80,10 +81,21 @@ class Observer(ABC):
     _number: int = -1
     _schedule: Any = None  # of the newest sample
     _alarm: Step | None = None
+    _newest: Step | None = None
 
     def __init__(self, model: UncertainModel) -> None:
         expect_model("model", model)
         self.model = model
+
+    def __repr__(self) -> str:
+        options = ", ".join(f"{name} {brief(value)}" for name, value in self._options().items())
+        where = f"at sample {self._number}" if self._number >= 0 else "before its first sample"
+        fallen = ", falsified" if self._alarm is not None else ""
+        return in_a_line(f"<{type(self).__name__} {where}{fallen}: {options}; {self.model!r}>")
+
+    def _picture(self) -> Picture | None:
+        newest = self._alarm or self._newest
+        return newest._picture() if newest is not None and newest.sample == self._number else None
 
     # -- samples -----------------------------------------------------------------------------------
 
@@ -356,7 +368,7 @@ class Observer(ABC):
     def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> Step:
         """A transition and a measurement, by the time ``end`` of `time.perf_counter` if there is one."""
 
-    def _warm_up(self) -> None:  # noqa: B027
+    def _warm_up(self) -> None:
         """As `warm_up`; nothing, unless something is loaded late."""
 
     # -- hooks of what some can do -----------------------------------------------------------------------
@@ -397,7 +409,7 @@ class Observer(ABC):
     # -- inside ------------------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._number, self._alarm, self._schedule, self.largest_at = -1, None, None, None
+        self._number, self._alarm, self._newest, self._schedule, self.largest_at = -1, None, None, None, None
 
     def _ask(self, begun: float, schedule: Any, hook: Callable[[], Step]) -> Step:
         """The answer of a hook at the next sample."""
@@ -417,6 +429,7 @@ class Observer(ABC):
         object.__setattr__(step, "sample", self._number)
         object.__setattr__(step, "stopped", self.stopped - stopped)
         object.__setattr__(step, "seconds", perf_counter() - begun)
+        self._newest = step
         if step.verdict == "falsified":
             self._alarm = step
         return step

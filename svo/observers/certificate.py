@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from polytopes.shown import Picture, Shown
 from svo.checks import Array
 from svo.logs.log import Log
 from svo.models import ModelSample
@@ -26,7 +27,7 @@ class Evidence(Protocol):
     def noise(self) -> Array: ...
 
 
-class Certificate(ABC):
+class Certificate(Shown, ABC):
     """Proof that a model does not explain some data: a frozen dataclass of all that the proof needs.
 
     A kind of its own defines `verify` and `premise`, and has `samples`. To be stored with alarms it stands in
@@ -58,6 +59,23 @@ class Certificate(ABC):
     @abstractmethod
     def premise(self, sample: int) -> str:
         """What a proof that holds rests on, in words; its last sample is the log's ``sample``."""
+
+    def _picture(self) -> Picture | None:
+        """The readings that the proof is about, those that carry it ringed where the proof tells them."""
+        if not self.samples:
+            return None
+        y = np.array([s.y for s in self.samples])
+        weights = np.array([getattr(s, "on_output", np.zeros(y.shape[1])) for s in self.samples])
+
+        def draw(ax: Any) -> None:
+            for j, (readings, on) in enumerate(zip(y.T, weights.T, strict=True)):
+                (line,) = ax.plot(readings, ".-", linewidth=0.7, label=f"y[{j}]")
+                at = np.flatnonzero(on)
+                ax.plot(at, readings[at], "o", markersize=9, fillstyle="none", color=line.get_color())
+            ax.set(xlabel="sample of the proof, the last one falsifies", title="readings; ringed: they carry it")
+            ax.legend(fontsize=8)
+
+        return Picture(draw, 4.8, 3.0)
 
     def to_dict(self) -> dict[str, Any]:
         """What JSON can hold, floats in hexadecimal.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from polytopes.shown import Picture, Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, optional_import
 from svo.logs.log import Log
@@ -24,7 +25,7 @@ _MODEL = COLOURS[2]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Record:
+class Record(Shown):
     """A log of K samples seen by one observer.
 
     Attributes
@@ -77,11 +78,14 @@ class Record:
         -------
         list of Artist
         """
+        return self._timeline(channels).draw(ax)
+
+    def _timeline(self, channels: Sequence[str] | None) -> Timeline:
         at = self.falsified_at
         lane = Lane("verdict", _MODEL, tuple(self._spans()), () if at is None else (at,))
         marks = {} if at is None else {at: f"falsified at {in_seconds(self.time[at], self.labels.Ts)}"}
         panels = panels_of(self.log, self.labels, {_MODEL: (self.lower, self.upper)}, channels)
-        return Timeline(self.time, [lane], panels, marks).draw(ax)
+        return Timeline(self.time, [lane], panels, marks)
 
     def to_dataframe(self) -> Any:
         """A `pandas.DataFrame`, a row a sample: time, verdict, readings, and bounds of each state."""
@@ -97,6 +101,10 @@ class Record:
         found = "consistent to the end" if at is None else f"falsified at sample {at} ({in_seconds(self.time[at], Ts)})"
         more = f", {undecided} undecided" if undecided else ""
         return f"<Record of {len(self.verdicts)} samples: {found}{more}>"
+
+    def _picture(self) -> Picture:
+        timeline = self._timeline(None)
+        return Picture(timeline.draw, timeline.width, timeline.height)
 
     def _spans(self) -> Iterator[Span]:
         for verdict, first, end in runs(self.verdicts):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import in_a_line
 from svo.pictures.style import INK, PALE, STYLE, axes_or_new
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 _BINS = 1000  # of a picture's width; more samples are drawn by the hull of each bin
 _LANE, _GAP = 0.24, 0.34  # height of a lane and of the space above a panel, where a panel is 1
 _INCHES = 1.35  # a panel
+_NAME = 24  # characters of the name of a lane
 _READABLE = 0.1  # of the width: a span that has room for its word
 
 
@@ -85,15 +87,15 @@ class Timeline:
         """Draw it in the place of some axes, or in a new figure; returns the artists."""
         import matplotlib as mpl
 
-        heights = np.array([_LANE * len(self.lanes), *[1.0] * len(self.panels)])
+        heights = self._heights
         total = float(np.sum(heights + _GAP))
         with mpl.rc_context({**STYLE, "font.size": 8.5, "axes.titlesize": 9.0, "axes.titleweight": "normal"}):
-            ax = axes_or_new(ax, 7.0, _INCHES * total)
+            ax = axes_or_new(ax, self.width, self.height)
             ax.set_axis_off()
             tops = 1.0 - np.cumsum(heights + _GAP) / total
             boxes = [ax.inset_axes((0.0, top, 1.0, height / total)) for top, height in zip(tops, heights, strict=True)]
-            artists = self._draw_lanes(boxes[0])
-            for box, panel in zip(boxes[1:], self.panels, strict=True):
+            artists = self._draw_lanes(boxes[0]) if self.lanes else []
+            for box, panel in zip(boxes[-len(self.panels) :] if self.panels else [], self.panels, strict=True):
                 artists += self._draw_panel(box, panel)
             artists += self._draw_marks(boxes)
             for box in boxes:
@@ -102,6 +104,20 @@ class Timeline:
                 box.tick_params(labelbottom=False)
             boxes[-1].set_xlabel("time [s]")
         return artists
+
+    @property
+    def width(self) -> float:
+        """Of a figure of its own [inches]."""
+        return 7.0
+
+    @property
+    def height(self) -> float:
+        """Of a figure of its own [inches]."""
+        return _INCHES * float(np.sum(self._heights + _GAP))
+
+    @property
+    def _heights(self) -> Array:
+        return np.array([_LANE * len(self.lanes)] * bool(self.lanes) + [1.0] * len(self.panels))
 
     @property
     def _end(self) -> float:
@@ -122,7 +138,7 @@ class Timeline:
                     artists.append(ax.text((left + right) / 2, row, span.text, **ink))
             at = edges[list(lane.falls)]
             artists += ax.plot(at, np.full(len(at), row), "x", color=INK, markersize=5, markeredgewidth=1.4, zorder=4)
-        ax.set(yticks=range(len(self.lanes)), yticklabels=[lane.label for lane in self.lanes])
+        ax.set(yticks=range(len(self.lanes)), yticklabels=[in_a_line(lane.label, _NAME) for lane in self.lanes])
         for text, lane in zip(ax.get_yticklabels(), self.lanes, strict=True):
             text.set_color(lane.colour)
         ax.set_ylim(len(self.lanes) - 0.5, -0.5)
@@ -147,7 +163,7 @@ class Timeline:
             times = np.concatenate([time, time]) if len(time) < len(self.time) else time
             artists += ax.plot(times, both, ".", color=INK, markersize=2.4)
         ax.set_ylim(lowest, highest)
-        ax.set_title(panel.label + _legend(panel), pad=3)
+        ax.set_title(in_a_line(panel.label, 60) + _legend(panel), pad=3)
         return artists
 
     def _draw_marks(self, boxes: Sequence[Axes]) -> list[Artist]:
@@ -156,7 +172,7 @@ class Timeline:
         for sample in self.marks:
             artists += [box.axvline(float(self.time[sample]), **line) for box in boxes]
         if self.marks:
-            said = ",  ".join(self.marks.values())
+            said = in_a_line(",  ".join(self.marks.values()), 90)
             artists.append(boxes[0].set_title(said, pad=3))
         return artists
 
@@ -164,7 +180,8 @@ class Timeline:
 def _legend(panel: Panel) -> str:
     parts = {"bounds": bool(panel.bounds), "readings as dots": panel.readings is not None,
              "true value as a line": panel.truth is not None}  # fmt: skip
-    return ": " + ", ".join(name for name, there in parts.items() if there)
+    told = [name for name, there in parts.items() if there]
+    return "" if told == ["true value as a line"] else f": {', '.join(told)}"
 
 
 def _limits(panel: Panel) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Shown
 from svo.isolation import Bank
 from svo.logs.log import Log
 from svo.logs.names import Columns
@@ -26,7 +27,7 @@ Distribution = Literal["bounded", "gaussian"]
 
 
 @dataclass(frozen=True)
-class Reference:
+class Reference(Shown):
     """What a paper reports for one fault and profile, as it is to be printed: times to ``detect`` and ``isolate`` it.
 
     In seconds, "-" where it is silent.
@@ -140,7 +141,7 @@ class Plant(Protocol):
 
 
 @dataclass(frozen=True)
-class StatedFault:
+class StatedFault(Shown):
     """A plant with one fault of one size, held from its first sample on.
 
     Attributes
@@ -201,7 +202,7 @@ def in_architecture(plant: Any, architecture: str | None) -> Any:
 
 
 @dataclass(frozen=True)
-class Exhibit:
+class Exhibit(Shown):
     """A picture that a plant adds to its study: its ``path``, and what it shows as ``title`` and ``caption``."""
 
     path: Path
@@ -210,7 +211,7 @@ class Exhibit:
 
 
 @dataclass(frozen=True)
-class AddedStudy:
+class AddedStudy(Shown):
     """A study that a plant adds to that of its bank: jobs for the engine of all studies.
 
     Attributes

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.shown import Shown
 from svo.checks import Array, expect, is_count, is_finite_number, readings, real_array
 
 
@@ -20,14 +21,14 @@ class Decision(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DecisionRecord:
+class DecisionRecord(Shown):
     """Answers over K samples: statistic (K,), NaN while there are too few samples, and alarm (K,) of bool."""
 
     statistic: Array
     alarm: NDArray[np.bool_]
 
 
-class ResidualTest(ABC):
+class ResidualTest(Shown, ABC):
     """A test of H0, "the mean of the residual is as without a fault", against H1 (equation (44)).
 
     A test is a frozen description and keeps no data; `start` gives something to feed sample by sample. A residual that
@@ -70,7 +71,7 @@ class ResidualTest(ABC):
         """The next state and answer, for a finite sample."""
 
 
-class OnlineTest:
+class OnlineTest(Shown):
     """One run of a test, sample by sample; `ResidualTest.start` makes it."""
 
     def __init__(self, test: ResidualTest) -> None:

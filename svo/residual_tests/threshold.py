@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect_shape, finite_array, readings
 from svo.residual_tests.interface import (
@@ -68,7 +69,7 @@ class StaticThreshold(WindowTest):
 
 
 @dataclass(frozen=True)
-class BoundedThreshold:
+class BoundedThreshold(Shown):
     """H1 where the residual leaves the bounds that no fault-free run can leave.
 
     The statistic is how far the residual is outside, in its own units, negative inside. False-alarm rate: zero as

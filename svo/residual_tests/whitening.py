@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
+from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.checks import Array, finite_array
 from svo.residual_tests.interface import check_count, check_finite, check_positive
@@ -17,7 +18,7 @@ from svo.residual_tests.interface import check_count, check_finite, check_positi
 
 @options_by_name
 @dataclass(frozen=True)
-class Whitening:
+class Whitening(Shown):
     """An autoregressive filter that makes a fault-free residual white, with mean 0 and variance 1.
 
     e(k) = (r(k) - mean - sum_j coefficients[j] (r(k-1-j) - mean)) / sigma.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.checks import expect
 from svo.plant import HEALTHY, Plant, architecture_of, chosen_noise, in_architecture
 
@@ -41,7 +42,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class StudyConfiguration:
+class StudyConfiguration(Shown):
     """Everything that the results of a study depend on, besides the versions of the software.
 
     Attributes

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Generic, TypeVar
 
+from polytopes.shown import Shown
+
 Subject = TypeVar("Subject")
 
 
@@ -33,7 +35,7 @@ class NotApplicable(Exception):
 
 
 @dataclass(frozen=True)
-class Rule(Generic[Subject]):
+class Rule(Shown, Generic[Subject]):
     """One demand.
 
     Attributes
@@ -70,7 +72,7 @@ class Rule(Generic[Subject]):
 
 
 @dataclass(frozen=True)
-class Conformance:
+class Conformance(Shown):
     """What a check asked.
 
     Attributes

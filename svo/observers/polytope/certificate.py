@@ -10,6 +10,7 @@ import numpy as np
 from polytopes import Certificate as Multipliers
 from polytopes import HPolytope
 from polytopes.exact import ZERO, rational
+from polytopes.shown import Picture
 from svo.checks import Array
 from svo.observers.certificate import Certificate, started_again
 
@@ -108,6 +109,9 @@ class PolytopeCertificate(Certificate):
         explained = self.data is None or self.data.explains(self.measurement)
         rows = "" if explained else ", and the bounds of the uncertain output"
         return f"the set before the measurement{rows}" + started_again(self.largest_at, self.sample, sample)
+
+    def _picture(self) -> Picture:
+        return self.multipliers._picture()
 
     def to_dict(self) -> dict[str, Any]:
         if self.data is None:

@@ -15,6 +15,7 @@ from time import perf_counter
 from flint import fmpq
 
 from polytopes.exact import rational
+from polytopes.shown import Shown
 from svo.checks import Array, expect_kind
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
@@ -25,7 +26,7 @@ from svo.observers.window.window import Window
 
 
 @dataclass(frozen=True, eq=False)
-class ChainCheck:
+class ChainCheck(Shown):
     """What `prove_chain` found when it ran a log again.
 
     Attributes
@@ -56,7 +57,7 @@ class ChainCheck:
 
 
 @dataclass(frozen=True, eq=False)
-class LateMeasurement:
+class LateMeasurement(Shown):
     """Outputs y (ny,) of sample ``taken`` that the observer got right after sample ``arrived``; NaN = not these."""
 
     arrived: int

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.shown import Shown
 from svo.checks import Array
 from svo.models import Exponents
 
 
 @dataclass(frozen=True, eq=False)
-class ArrivalSet:
+class ArrivalSet(Shown):
     """{x : box_lower <= x <= box_upper, lower <= rows x <= upper}: what was known of the window's first state."""
 
     box_lower: Array
@@ -40,7 +41,7 @@ class ArrivalSet:
 
 
 @dataclass(frozen=True, eq=False)
-class WindowSample:
+class WindowSample(Shown):
     """Model and data of one sample of a window, with the multipliers of its rows.
 
     Attributes
@@ -74,7 +75,7 @@ class WindowSample:
 
 
 @dataclass(frozen=True, eq=False)
-class WindowEvidence:
+class WindowEvidence(Shown):
     """What is known of a window, and the multipliers of its rows.
 
     Attributes

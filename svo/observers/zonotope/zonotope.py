@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.checks import Array
 
 EPS = float(np.finfo(np.float64).eps)
@@ -25,7 +26,7 @@ def unit(terms: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class ConstrainedZonotope:
+class ConstrainedZonotope(Shown):
     """{c + G xi + v : |xi| <= 1, |v| <= room, |A xi - b| <= slack}.
 
     In the form of Scott et al. (2016) the generators are [G diag(room) 0] and the constraints [A 0 diag(slack)].

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from polytopes.shown import Shown
 from svo.faults import ActuatorFault, PlantFault, SensorFault, Step
 from svo.isolation import GLOBAL, NOMINAL
 from svo.models import UncertainModel, Uncertainty
@@ -21,7 +22,7 @@ _KNOWN = {
 
 
 @dataclass(frozen=True)
-class FaultModel:
+class FaultModel(Shown):
     """An observer's model of a fault, and whether the healthy plant is one of the plants that it describes."""
 
     model: UncertainModel

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from polytopes.shown import Shown
 from svo.interval import GainBounds, IntervalDetector, IntervalPredictor, NoiseCharacterization
 from svo.logs.log import Log
 from svo.logs.names import Columns
@@ -20,7 +21,7 @@ _KNOWN = (
 
 
 @dataclass(frozen=True, eq=False)
-class IntervalSettings:
+class IntervalSettings(Shown):
     """An interval detector for one input and one output of a plant.
 
     Attributes

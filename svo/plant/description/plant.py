@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import HPolytope
+from polytopes.shown import Shown, in_a_line
 from svo.checks import Array, expect
 from svo.interval.on_log import ThresholdDetection, detect_thresholds
 from svo.isolation import ArchitectureI, ArchitectureII, Bank
@@ -34,7 +35,7 @@ STATED = "stated"
 
 
 @dataclass(frozen=True)
-class ObserverSettings:
+class ObserverSettings(Shown):
     """How every observer of a described plant runs; arguments of `svo.WindowObserver`."""
 
     horizon: int | None = 10
@@ -42,7 +43,7 @@ class ObserverSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class DescribedPlant:
+class DescribedPlant(Shown):
     """A `svo.plant.MonitoredPlant` with one noise set, "stated": the bounds of the file.
 
     Attributes
@@ -83,6 +84,9 @@ class DescribedPlant:
     interval: IntervalSettings | None = None
     dialect: Dialect | None = None
     noise_sets: tuple[str, ...] = (STATED,)
+
+    def __repr__(self) -> str:
+        return in_a_line(f"<DescribedPlant {self.name!r}: {self.title!r}; faults: {', '.join(self.faults) or 'none'}>")
 
     @property
     def Ts(self) -> float:
