@@ -274,7 +274,9 @@ class Bank(Shown, ABC):
         return recorder.record()
 
     @options_by_name
-    def follow(self, log: Log, *, start: int = 0) -> Iterator[tuple[Verdict, int]]:
+    def follow(
+        self, log: Log, boxes: Mapping[str, Array] | None = None, *, start: int = 0
+    ) -> Iterator[tuple[Verdict, int]]:
         """The verdicts over a log, each with the samples that it is of: many where nothing changes.
 
         A long log can be followed in portions, each with the last sample of the one before as its first. When all
@@ -283,6 +285,9 @@ class Bank(Shown, ABC):
         Parameters
         ----------
         log : Log
+        boxes : mapping of str to (K, 2, n) array, optional
+            For every observer: filled with lower and upper bounds of the state at each sample at which it is stepped,
+            which are computed only then.
         start : int
             First sample that the bank has not seen.
 
@@ -294,9 +299,16 @@ class Bank(Shown, ABC):
         expect_log(log)
         self._check_log(log, start)
         if self._may_start_again:
-            yield from ((verdict, 1) for verdict in drive(self, log, start=start))
+            for at, verdict in enumerate(drive(self, log, start=start), start=start):
+                for name, box in (boxes or {}).items():
+                    if name in verdict.steps:
+                        box[at] = verdict.steps[name].box
+                yield verdict, 1
             return
-        fronts = {name: Front(name, observer.follow(log, start=start)) for name, observer in self._running.items()}
+        fronts = {
+            name: Front(name, observer.follow(log, None if boxes is None else boxes[name], start=start))
+            for name, observer in self._running.items()
+        }
         k = start
         while k < len(log):
             running = [fronts[name] for name in self._running]
@@ -324,15 +336,8 @@ class Bank(Shown, ABC):
     def _boxes(self, log: Log) -> dict[str, tuple[Array, Array]]:
         """Bounds of the state over a log by each observer, (K, n) each; NaN where it has none."""
         boxes = {name: np.full((len(log), 2, o.model.n_states), np.nan) for name, o in self.observers.items()}
-        if self._may_start_again:
-            for verdict in drive(self, log):
-                for name, step in verdict.steps.items():
-                    boxes[name][verdict.sample] = step.box
-        else:
-            for name, observer in self._running.items():
-                for _, step in observer.follow(log, boxes[name]):
-                    if step.verdict == "falsified":
-                        break
+        for _ in self.follow(log, boxes):
+            pass
         return {name: (box[:, 0], box[:, 1]) for name, box in boxes.items()}
 
     def __getstate__(self) -> dict[str, Any]:

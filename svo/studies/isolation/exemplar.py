@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from polytopes import HPolytope
 from svo.checks import Array, expect_shape
-from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.observers.base import Step
 from svo.plant import Plant, fault_start
@@ -150,29 +149,39 @@ def planar_outline(step: Step) -> HPolytope:
 
 
 def follow(plant: Plant, job: Job, log: Log, alive: NDArray[np.bool_]) -> Exemplar:
-    """Drive a fresh bank over a log and keep what it knew at each sample.
+    """Take a fresh bank over a log and keep what it knew at each sample.
 
-    ``alive`` (K, n_observers) is what a run of the bank said: it tells beforehand at which samples sets are kept.
+    ``alive`` (K, n_observers) is what a run of the bank said: it tells beforehand at which samples sets are kept, and
+    the bank stops there.
     """
     if log.x is None:
         raise ValueError(f"plant {plant.name!r} simulates without true states; expected Log.x for the pictures")
-    bank = plant.bank(job.noise)
+    bank, begins = plant.bank(job.noise), fault_start(plant, job.fault, job.profile)
     names, last = tuple(bank.names), len(log) - 1
-    falls = np.vstack([alive[:-1] & ~alive[1:], np.zeros_like(alive[:1])])
-    lower = np.full((len(log), len(names), log.x.shape[1]), np.nan)
-    upper = lower.copy()
+    boxes = {name: np.full((len(log), 2, log.x.shape[1]), np.nan) for name in names}
+    falls_next = np.vstack([alive[:-1] & ~alive[1:], np.zeros_like(alive[:1])])
+    kept = np.union1d(np.flatnonzero(falls_next.any(axis=1)), last).tolist()
     snapshots: list[Snapshot] = []
-    begins = fault_start(plant, job.fault, job.profile)
-    for k, verdict in enumerate(drive(bank, log)):
-        steps = {i: verdict.steps[names[i]] for i in np.flatnonzero(alive[k]) if names[i] in verdict.steps}
-        for i, step in steps.items():  # without class II that waits
-            lower[k, i], upper[k, i] = step.box
-        if (steps and falls[k].any()) or k == last:
-            compared = log.time[k] >= begins - plant.Ts and np.count_nonzero(alive[k]) > 1
-            sets = {names[i]: planar_outline(step) if compared else step.set for i, step in steps.items()}
-            fallen = ", ".join(name for name, falls_next in zip(names, falls[k], strict=True) if falls_next)
+    for before, k in itertools.pairwise([-1, *kept]):
+        rows = slice(max(before, 0), k + 1)
+        part = {name: box[rows] for name, box in boxes.items()}
+        *_, (verdict, _) = bank.follow(_part(log, rows), part, start=int(before >= 0))
+        living = [name for name, is_alive in zip(names, alive[k], strict=True) if is_alive]
+        steps = {name: verdict.steps[name] for name in living if name in verdict.steps}  # class II waits
+        compared = log.time[k] >= begins - plant.Ts and len(living) > 1
+        sets = {name: planar_outline(step) if compared else step.set for name, step in steps.items()}
+        fallen = ", ".join(name for name, falls in zip(names, falls_next[k], strict=True) if falls)
+        if sets or k == last:
             snapshots.append(Snapshot(k, f"{fallen} falsified next" if k < last else "end of the run", sets))
+    bounds = np.stack(list(boxes.values()), axis=1)  # (K, observers, 2, n)
+    bounds[~alive] = np.nan
+    lower, upper = bounds[:, :, 0], bounds[:, :, 1]
     return Exemplar(
         job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots),
         job.architecture,
     )  # fmt: skip
+
+
+def _part(log: Log, rows: slice) -> Log:
+    schedule = None if log.schedule is None else log.schedule[rows]
+    return replace(log, time=log.time[rows], u=log.u[rows], y=log.y[rows], x=None, schedule=schedule)

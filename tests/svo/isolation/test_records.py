@@ -105,6 +105,23 @@ def test_boxes_are_those_of_the_steps(kind: str) -> None:
         assert np.allclose(record.boxes[name], boxes, rtol=1e-9, atol=1e-12, equal_nan=True), name
 
 
+@pytest.mark.parametrize("kind", BANKS)
+@pytest.mark.parametrize("ends", [(60,), (1, 2, 30, 31, 60), (29, 45, 60)])
+def test_boxes_in_portions_are_those_of_the_whole_log(kind: str, ends: tuple[int, ...]) -> None:
+    log = faulty()
+    whole, followed, first = BANKS[kind]().run(log).boxes, BANKS[kind](), 0
+    boxes = {name: np.full((60, 2, 2), np.nan) for name in followed.observers}
+    for end in ends:
+        rows = slice(max(first - 1, 0), end)
+        part = replace(log, time=log.time[rows], u=log.u[rows], y=log.y[rows], x=None)
+        *_, (verdict, _) = followed.follow(part, {name: box[rows] for name, box in boxes.items()}, start=int(first > 0))
+        for name, step in verdict.steps.items():  # the bank stands at the end of the portion
+            np.testing.assert_allclose(step.box, boxes[name][end - 1], rtol=1e-9, atol=1e-12)
+        first = end
+    for name, box in boxes.items():
+        assert np.allclose(whole[name], (box[:, 0], box[:, 1]), rtol=1e-9, atol=1e-12, equal_nan=True), name
+
+
 def test_boxes_are_computed_once_and_only_when_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
     boxes = ArchitectureI._boxes
