@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from svo.isolation import ArchitectureI, ArchitectureII, BankRecord, Verdict
     from svo.logs.log import Log
     from svo.models import ScheduleTable, UncertainModel, Uncertainty
+    from svo.models.nonlinear import NonlinearModel
     from svo.observers.polytope.observer import PolytopeObserver
     from svo.observers.window.chain import ChainCheck, LateMeasurement, prove_chain
     from svo.observers.window.observer import WindowObserver
@@ -40,6 +41,7 @@ __all__ = [
     "InputDesign",
     "LateMeasurement",
     "Log",
+    "NonlinearModel",
     "PolytopeObserver",
     "ScheduleTable",
     "UncertainModel",
@@ -69,6 +71,7 @@ _HOMES = {
     "InputDesign": "svo.analysis.input_design",
     "LateMeasurement": "svo.observers.window.chain",
     "Log": "svo.logs.log",
+    "NonlinearModel": "svo.models.nonlinear",
     "PolytopeObserver": "svo.observers.polytope.observer",
     "ScheduleTable": "svo.models",
     "UncertainModel": "svo.models",

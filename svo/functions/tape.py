@@ -19,6 +19,9 @@ from svo.functions.operations import Op
 Integers = NDArray[np.int64]
 
 
+_UNKNOWN = ""  # why a slot has no value that reads a coordinate of which nothing is known
+
+
 class Unenclosed(ArithmeticError):
     """A row of a tape that has no bounded range over a box.
 
@@ -118,7 +121,7 @@ class Tape(Value):
             If a row has no bounded range.
         """
         low, high = lower.tolist(), upper.tolist()
-        ranges = self._run(lambda j: (low[j], high[j]), lambda values: values, applied)
+        ranges = self._rows(lambda j: (low[j], high[j]), lambda values: values, applied)
         ends = np.array(ranges).reshape(len(self.outputs), 2)
         return ends[:, 0].copy(), ends[:, 1].copy()
 
@@ -136,32 +139,50 @@ class Tape(Value):
         def variable(j: int) -> Form:
             return box.coordinate(j, low[j], high[j]) if j < free else box.constant((low[j], high[j]))
 
-        rows = self._run(variable, box.constant, box.applied)
+        rows = self._rows(variable, box.constant, box.applied)
         return Forms.of(np.array(box.centre), rows)
 
-    def _run(self, variable: Callable[[int], Any], constant: Callable[[Interval], Any], apply: Any) -> list[Any]:
-        """All slots in some arithmetic. One without a value passes by where a piece that does not hold reads it."""
+    def check(self, lower: Array, upper: Array) -> None:
+        """Raise Unenclosed if a row has no bounded range, whatever the coordinates are whose ends are NaN."""
+        low, high = lower.tolist(), upper.tolist()
+        _, why = self._run(lambda j: (low[j], high[j]) if low[j] == low[j] else None, lambda values: values, applied)
+        for row, slot in enumerate(self.outputs.tolist()):
+            if why.get(slot, _UNKNOWN) != _UNKNOWN:
+                raise Unenclosed(row, why[slot])
+
+    def _rows(self, *arithmetic: Any) -> list[Any]:
+        """The rows in some arithmetic."""
+        found, why = self._run(*arithmetic)
+        for row, slot in enumerate(self.outputs.tolist()):
+            if found[slot] is None:
+                raise Unenclosed(row, why[slot])
+        return [found[slot] for slot in self.outputs]
+
+    def _run(
+        self, variable: Callable[[int], Any], constant: Callable[[Interval], Any], apply: Callable[..., Any]
+    ) -> tuple[list[Any], dict[int, str]]:
+        """All slots, and why some have no value; one that a piece reads which does not hold is passed by."""
         found: list[Any] = []
         why: dict[int, str] = {}
         for i, (op, of, values) in enumerate(self._program):
             if op is Op.VARIABLE:
                 found.append(variable(of[0]))
+                if found[i] is None:
+                    why[i] = _UNKNOWN
                 continue
             if op is Op.CONSTANT:
                 found.append(constant(values))
                 continue
-            missing = next((j for j in of if found[j] is None), None)
+            missing = any(found[j] is None for j in of)
             try:
-                if missing is not None and (op is not Op.SELECT or found[of[0]] is None):
-                    raise NotEnclosed(why[missing])
+                if missing and (op is not Op.SELECT or found[of[0]] is None):
+                    raise NotEnclosed
                 found.append(apply(op, *(found[j] for j in of)))
             except NotEnclosed as error:
                 found.append(None)
-                why[i] = why[missing] if missing is not None else f"in {op.word}: {error}"
-        for row, slot in enumerate(self.outputs.tolist()):
-            if found[slot] is None:
-                raise Unenclosed(row, why[slot])
-        return [found[slot] for slot in self.outputs]
+                reasons = [why[j] for j in of if found[j] is None]
+                why[i] = next(filter(None, reasons), _UNKNOWN) if reasons else f"in {op.word}: {error}"
+        return found, why
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from polytopes.shown import Shown
 from svo.checks import expect
 from svo.logs.names import Column, Columns
 from svo.models.model import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Labels(Shown):
     units: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, model: UncertainModel) -> Labels:
+    def of(cls, model: UncertainModel | NonlinearModel) -> Labels:
         """Those of a model; x[0] and the like where it has no names."""
         names = dict(model.names or {})
         states = names.get("states", [f"x[{i}]" for i in range(model.n_states)])
@@ -86,8 +87,10 @@ class Labels(Shown):
         return self.reads.index(state) if state in self.reads else None
 
 
-def _reads(model: UncertainModel) -> tuple[int | None, ...]:
+def _reads(model: UncertainModel | NonlinearModel) -> tuple[int | None, ...]:
     """Only what is constant and exact counts: a row of the identity, and no other term."""
+    if isinstance(model, NonlinearModel):
+        return model.reads
     if any(callable(value) for value in (model.C, model.D, model.c)):
         return (None,) * model.n_outputs
     stack: Any = model.stack(model.schedule)[:, model.n_states :]

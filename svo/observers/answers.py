@@ -34,7 +34,9 @@ class Step(Shown, ABC):
     reason : str or None
         Why a verdict is "undecided", where it is known: "outgrown" (the set has grown beyond all bounds of use in a gap
         of the measurements, and what came back does not yet bound the state), "outside the physical range" (of all that
-        the data allow, without a proof), "a reading is too large" (for a polytope, which then goes on without it).
+        the data allow, without a proof), "a reading is too large" (for a polytope, which then goes on without it),
+        "outside: at sample ..." (a nonlinear model is not linearised there, for the cause that follows; its set starts
+        again from ``largest``).
     sample : int
         Counted from the first measurement, which is 0; the observer fills it in. After a falsification it is that of
         the falsification until the observer is reset.

@@ -23,6 +23,7 @@ from svo.checks import Array, is_count
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models import Labels, UncertainModel, expect_model
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.answers import Seen, Step, VerdictName
 from svo.observers.certificate import Certificate
 from svo.observers.data import (
@@ -66,6 +67,8 @@ class Observer(Shown, ABC):
         Whether it can be saved and go on: `_options`, `_state`, `_set_up` and `_resume` are defined.
     starts_without_set : bool
         Whether it can start with nothing known of the state: `_lose_set` is defined.
+    takes_nonlinear : bool
+        Whether its model may be a `NonlinearModel`.
     largest_at : int or None
         Sample at which the set last started from the model's largest set, if what is known now rests on it.
     """
@@ -75,6 +78,7 @@ class Observer(Shown, ABC):
     takes_late: ClassVar[bool] = False
     saves_state: ClassVar[bool] = False
     starts_without_set: ClassVar[bool] = False
+    takes_nonlinear: ClassVar[bool] = False
 
     model: UncertainModel
     largest_at: int | None = None
@@ -84,7 +88,8 @@ class Observer(Shown, ABC):
     _newest: Step | None = None
 
     def __init__(self, model: UncertainModel) -> None:
-        expect_model("model", model)
+        if not (self.takes_nonlinear and isinstance(model, NonlinearModel)):
+            expect_model("model", model)
         self.model = model
 
     def __repr__(self) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from svo.checks import Array, finite_array, floats, is_finite_number, real_number
 from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 
 
 def outputs_of(model: UncertainModel, y: ArrayLike) -> Array:
@@ -38,8 +39,10 @@ def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: boo
     return array
 
 
-def check_schedule(model: UncertainModel, schedule: Any) -> None:
-    """Raise an error if a model needs a schedule and there is none."""
+def check_schedule(model: UncertainModel | NonlinearModel, schedule: Any) -> None:
+    """Raise an error if a model needs a schedule and there is none, or takes none and there is one."""
+    if schedule is not None and isinstance(model, NonlinearModel):
+        raise ValueError("schedule is given; a nonlinear model takes none, since it is linearised at each sample")
     if model.is_scheduled and schedule is None:
         raise ValueError("schedule is missing: the model has arrays that are functions of it, so pass schedule=...")
 

@@ -7,9 +7,10 @@ import numpy as np
 from polytopes import HPolytope
 from svo.checks import Array, bounded_box
 from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 
 
-def first_box(P: HPolytope, model: UncertainModel) -> tuple[Array, Array]:
+def first_box(P: HPolytope, model: UncertainModel | NonlinearModel) -> tuple[Array, Array]:
     """Bounds of a set of first states of a model, within its physical range.
 
     Raises
@@ -18,11 +19,12 @@ def first_box(P: HPolytope, model: UncertainModel) -> tuple[Array, Array]:
         If it is no set of so many states, empty, unbounded, or outside the physical range.
     """
     lower, upper = finite_box(P, model.n_states)
-    if model.physical_range is None:
-        return lower, upper
-    lower, upper, meets = model.physical_range.cut(lower, upper)
-    if not meets:
-        raise ValueError("initial and the model's physical range have no common point; expected first states within it")
+    if model.physical_range is not None:
+        lower, upper, meets = model.physical_range.cut(lower, upper)
+        if not meets:
+            raise ValueError(
+                "initial and the model's physical range have no common point; expected first states within it"
+            )
     return lower, upper
 
 

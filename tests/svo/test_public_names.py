@@ -18,8 +18,11 @@ from svo.faults import SensorFault, Step
 NAMES = {
     "polytopes": ["HPolytope"],
     "svo": [
-        "ArchitectureI", "ArchitectureII", "ConstrainedZonotopeObserver", "PolytopeObserver", "UncertainModel",
-        "Uncertainty", "WindowObserver", "detect", "find_plant", "read_log", "verify",
+        "ArchitectureI", "ArchitectureII", "ConstrainedZonotopeObserver", "NonlinearModel", "PolytopeObserver",
+        "UncertainModel", "Uncertainty", "WindowObserver", "detect", "find_plant", "read_log", "verify",
+    ],
+    "svo.functions": [
+        "abs", "atan2", "cos", "exp", "log", "max", "min", "piecewise", "sign", "sin", "sqrt", "sroot", "tanh",
     ],
     "svo.plant": ["Plant"],
     "svo.faults": ["ActuatorFault", "Exponential", "Intermittent", "PlantFault", "Ramp", "SensorFault", "Step"],
@@ -31,6 +34,13 @@ ARGUMENTS = [
     (UncertainModel, ["A", "B", "C", "E", "w", "D", "F", "n", "a", "c", "Ts", "names", "uncertainties"]),
     (svo.Uncertainty, ["A", "B", "a", "E", "C", "D", "c", "F", "bounds"]),
     (UncertainModel.simulate, ["x0", "u", "rng"]),
+    (
+        svo.NonlinearModel,
+        [
+            "f", "h", "states", "inputs", "disturbances", "parameters", "Ts", "n", "w", "physical", "valid", "largest",
+            "continuous",
+        ],
+    ),
     (WindowObserver, ["model", "initial", "horizon", "template"]),
     (WindowObserver.update, ["y0", "u", "schedule"]),
     (WindowObserver.step, ["u", "y", "u_next", "schedule"]),

@@ -90,6 +90,13 @@ class Flow:
         except Unenclosed as error:
             raise self._undecided(error) from None
 
+    def check(self, x: Span, u: Array) -> None:
+        """Raise Undecided if f is not bounded over a box of states, whatever the inputs are that are NaN."""
+        try:
+            self.tape.check(*self._joint(x, u))
+        except Unenclosed as error:
+            raise self._undecided(error) from None
+
     def inside(self, x: Span) -> Span:
         """A box of states cut by what is physical."""
         return Span(*within(self.physical, x.lower, x.upper))

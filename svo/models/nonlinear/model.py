@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_kind, expect_shape, finite_array, is_count, positive_number, sizes
+from svo.functions.operations import Op
 from svo.functions.tape import Tape
 from svo.logs.log import Log
 from svo.models.nonlinear.carrier import carrier_of
 from svo.models.nonlinear.flow import Flow, Span, Undecided
-from svo.models.nonlinear.output import LinearOutput, linear_output
+from svo.models.nonlinear.output import LinearOutput, check_output, linear_output
 from svo.models.nonlinear.simulation import simulated
 from svo.models.nonlinear.tracing import Function, Sizes, traced
 from svo.models.nonlinear.transition import Transition, mapped, transition
@@ -110,7 +111,8 @@ class NonlinearModel:
         span = _bounds(self.w, self.disturbances, self.parameters)
         all_names = [*self.states, *self.inputs, *self.disturbances, *self.parameters]
         twice = next((name for name in all_names if all_names.count(name) > 1), None)
-        expect(twice is None, "a name", twice, "names of states, inputs, disturbances and parameters that differ")
+        if twice is not None:
+            raise ValueError(f"the name {twice!r} stands for two things; expected states, inputs and so on to differ")
         size = Sizes(len(self.states), len(self.disturbances), len(self.parameters), len(self.inputs))
         for name in ("physical", "valid"):
             put(f"{name}_range", state_range(name, getattr(self, name), size.x, bounded=False))
@@ -161,6 +163,13 @@ class NonlinearModel:
         return bool(used[len(used) - self.n_inputs :].any())
 
     @property
+    def reads(self) -> tuple[int | None, ...]:
+        """Of each output, the state that it reads as it is; None where it is anything else."""
+        tape = self.reading
+        slots = [(int(tape.operands[i, 0]), tape.op[i] == Op.VARIABLE) for i in tape.outputs.tolist()]
+        return tuple(j if plain and j < self.n_states else None for j, plain in slots)
+
+    @property
     def names(self) -> Mapping[str, Sequence[str]]:
         """Of states, inputs, outputs and disturbances."""
         every = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs or ()}
@@ -176,6 +185,7 @@ class NonlinearModel:
 
     # -- over a set ------------------------------------------------------------------------------
 
+    @options_by_name
     def transition(
         self, lower: ArrayLike, upper: ArrayLike, u: ArrayLike = (), *, dt: float | None = None
     ) -> Transition:
@@ -233,6 +243,22 @@ class NonlinearModel:
         inputs = finite_array("u", u, (self.n_inputs,))
         return linear_output(self.reading, self.flow.w, self._box(lower, upper), inputs, self.outputs or ())
 
+    def check_first(self, lower: Array, upper: Array) -> None:
+        """Refuse first states from ``lower`` to ``upper`` (n,) for which the equations do not hold or have no value.
+
+        Raises
+        ------
+        ValueError
+            Naming the state, the row of f or h, and why.
+        """
+        box, unknown = Span(lower, upper), np.full(self.n_inputs, np.nan)
+        try:
+            self.flow.check_valid(box)
+            self.flow.check(box, unknown)
+            check_output(self.reading, self.flow.w, box, unknown, self.outputs or ())
+        except Undecided as error:
+            raise ValueError(f"initial: {error}; expected a smaller set, or one elsewhere") from None
+
     def _box(self, lower: ArrayLike, upper: ArrayLike) -> Span:
         box = Span(*(finite_array(n, v, (self.n_states,)) for n, v in (("lower", lower), ("upper", upper))))
         expect((box.lower <= box.upper).all(), "lower", box.lower, f"bounds not above upper = {box.upper}")
@@ -258,7 +284,7 @@ class NonlinearModel:
         corners : bool
             Draw every w, p and noise at an end of its interval instead of uniformly inside.
         substeps : int
-            Steps of the integration within a quarter of a sample.
+            Steps of the integration within a sample, or within a quarter of it where something varies.
 
         Raises
         ------

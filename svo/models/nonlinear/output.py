@@ -25,11 +25,10 @@ class LinearOutput(NamedTuple):
 def linear_output(tape: Tape, w: Span, x: Span, u: Array, names: Sequence[str]) -> LinearOutput:
     """Of the tape of h, whose disturbances and parameters go into R."""
     n = len(x.lower)
-    lower, upper = (np.concatenate([x[i], w[i], u]) for i in range(2))
     try:
-        forms = tape.forms(lower, upper, free=n + len(w.lower))
+        forms = tape.forms(*_joint(x, w, u), free=n + len(w.lower))
     except Unenclosed as error:
-        raise Undecided(f"the output {names[error.row]} is not enclosed, {error}") from None
+        raise _undecided(error, names) from None
     C, F, centre = forms.g[:, :n], forms.g[:, n:], forms.centre[:n]
     size = (
         np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high) + np.abs(C) @ (2.0 * x.largest) + np.abs(F) @ w.largest
@@ -37,6 +36,22 @@ def linear_output(tape: Tape, w: Span, x: Span, u: Array, names: Sequence[str]) 
     R = 0.5 * (forms.high - forms.low) + np.abs(F) @ (0.5 * w.width)
     R = R + (n + len(w.lower) + 8) * _EPS * size
     return LinearOutput(C, forms.k + 0.5 * (forms.low + forms.high) - C @ centre, R)
+
+
+def check_output(tape: Tape, w: Span, x: Span, u: Array, names: Sequence[str]) -> None:
+    """Raise Undecided if h is not bounded over a box of states, whatever the inputs are that are NaN."""
+    try:
+        tape.check(*_joint(x, w, u))
+    except Unenclosed as error:
+        raise _undecided(error, names) from None
+
+
+def _joint(x: Span, w: Span, u: Array) -> tuple[Array, Array]:
+    return np.concatenate([x.lower, w.lower, u]), np.concatenate([x.upper, w.upper, u])
+
+
+def _undecided(error: Unenclosed, names: Sequence[str]) -> Undecided:
+    return Undecided(f"the output {names[error.row]} is not enclosed, {error}")
 
 
 def cut(box: Span, y: Array, reading: LinearOutput, noise: Array) -> Span | None:

@@ -43,10 +43,11 @@ def advanced(
     """The next state; what varies has w at the sample only, and others within it."""
     if T is None:
         return flow.tape.values(np.concatenate([x, w, u]))
-    for piece in range(_PIECES):
+    pieces = _PIECES if flow.varying.any() else 1
+    for piece in range(pieces):
         if piece:
             w = np.where(flow.varying, draw(flow.w.lower, flow.w.upper, rng, corners), w)
-        x = integrated(flow, x, w, u, T / _PIECES, substeps)
+        x = integrated(flow, x, w, u, T / pieces, substeps)
     return x
 
 

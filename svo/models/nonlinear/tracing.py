@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any, NamedTuple
 
@@ -10,6 +10,7 @@ from svo.functions.expression import Recorder, rows_of, variables
 from svo.functions.tape import Tape
 
 ORDER = "xwpu"  # of the coordinates of z
+Function = Callable[..., Any]
 _MEANING = {"x": "states", "u": "inputs", "w": "disturbances", "p": "parameters"}
 
 
@@ -46,6 +47,7 @@ def traced(what: str, function: Any, sizes: Sizes, names: Sequence[str] | None) 
         kind = TypeError if isinstance(error, TypeError) else ValueError
         raise kind(f"{what}: {error}") from error
     if names is None:
+        found = found if isinstance(found, Iterable) else [found]
         found = list(found)
         names = [f"y[{i}]" for i in range(len(found))]
     return Tape.of(recorder, rows_of(what, found, recorder, names), first)
@@ -68,6 +70,3 @@ def _arguments(what: str, function: Any, sizes: Sizes) -> Mapping[str, str]:
         if not getattr(sizes, letter):
             raise ValueError(f"{what} has an argument {letter!r}, but the model has no {_MEANING[letter]}")
     return named
-
-
-Function = Callable[..., Any]

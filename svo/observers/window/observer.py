@@ -19,6 +19,7 @@ from svo.checks import Array, expect, is_count
 from svo.logs.drive import advance_to
 from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel
+from svo.models.nonlinear import NonlinearModel, Span, Undecided
 from svo.models.state_range import within
 from svo.observers.answers import VerdictName
 from svo.observers.base import Observer, Seen, Step
@@ -31,6 +32,7 @@ from svo.observers.saved_state import arrays_of, numbers
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_samples import LogSamples, log_samples
 from svo.observers.window.memory import WindowSettings
+from svo.observers.window.relinearised import Relinearised
 from svo.observers.window.sample import Outgrown, Sample, check_matrices
 from svo.observers.window.setup import arrival_of, needs_next_input, template_rows
 from svo.observers.window.step import WindowStep
@@ -53,7 +55,8 @@ class WindowObserver(Observer):
 
     Parameters
     ----------
-    model : UncertainModel
+    model : UncertainModel or NonlinearModel
+        A nonlinear one is linearised at each sample over the set that is known there.
     initial : HPolytope
         Bounded set that contains the state at the first sample.
     horizon : int or None
@@ -80,12 +83,12 @@ class WindowObserver(Observer):
     """
 
     kind = "window"
-    takes_deadline = takes_late = saves_state = starts_without_set = True
+    takes_deadline = takes_late = saves_state = starts_without_set = takes_nonlinear = True
 
     @options_by_name
     def __init__(
         self,
-        model: UncertainModel,
+        model: UncertainModel | NonlinearModel,
         initial: HPolytope,
         horizon: int | None = 10,
         *,
@@ -93,24 +96,29 @@ class WindowObserver(Observer):
         eps: float = 1e-9,
         sign_split: int = 0,
     ) -> None:
-        super().__init__(model)
+        super().__init__(model)  # type: ignore[arg-type]  # a nonlinear one answers what is asked of it here
         if horizon is not None:
             expect(is_count(horizon, 1), "horizon", horizon, "an integer number of steps >= 1, or None for all data")
         slack = relative_slack(eps)
         expect(is_count(sign_split, 0), "sign_split", sign_split, "a number of cells >= 0 (0 = convex hulls)")
         rows = template_rows(template, model.n_states)
-        lower, upper = first_box(initial, model)
-        form = NormalForm.at(model, lower, upper)
+        lower, upper = first_box(initial, self.model)
+        self._plant: Relinearised | None = None
+        linear = self.model
+        if isinstance(model, NonlinearModel):
+            model.check_first(lower, upper)
+            self._plant, linear = Relinearised(model), model.carrier
+        form = NormalForm.at(linear, lower, upper)
         steps = None if horizon is None else int(horizon)
         self._configure(WindowSettings(form, steps, rows * form.x, slack, int(sign_split)))
         self._reset(initial, lower, upper)
 
     def _configure(self, settings: WindowSettings, prover: Callable[[bool], Prover] | None = None) -> None:
         """Settings, and what makes a prover of a window whose anchor follows from its readings, or does not."""
-        self.model, self._settings, self._form = settings.form.given, settings, settings.form
+        self._settings, self._form = settings, settings.form
         self.horizon, self.eps, self.sign_split = settings.horizon, settings.eps, settings.sign_split
         self._normal, self._make_prover = settings.form.model, prover
-        self._wants_next_input = needs_next_input(self._normal)
+        self._wants_next_input = needs_next_input(self._normal) or self.model.uses_input_in_output
         self.prover = None if prover is None else prover(False)
 
     @property
@@ -153,6 +161,8 @@ class WindowObserver(Observer):
 
         Convex hulls are kept where this one splits by signs.
         """
+        if self._plant is not None:
+            raise TypeError("the observer has a nonlinear model; a proof from its first sample on takes a linear one")
         again = copy(self)
         again._configure(replace(self._settings, sign_split=0), prover)
         again._forget()
@@ -171,6 +181,8 @@ class WindowObserver(Observer):
         self._readings: Readings | None = None  # of a set that is lost, or too wide
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)  # samples since each sensor was read
         self._window = Window(self._settings, initial, prover=self.prover)
+        if self._plant is not None:
+            self._plant.start_from(Span(initial.box_lower * self._form.x, initial.box_upper * self._form.x))
 
     def _lose_set(self) -> None:
         largest = self._normal.start_range
@@ -184,6 +196,8 @@ class WindowObserver(Observer):
         return self._said(self._take(self._sample(np.zeros(self.model.n_inputs), u, y, schedule), None))
 
     def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> WindowStep:
+        if self._plant is not None:
+            self._relinearise(self._plant, u)
         return self._said(self._take(self._sample(u, u_next, y, schedule), end))
 
     @property
@@ -214,6 +228,8 @@ class WindowObserver(Observer):
         return {"horizon": horizon, "template": rows, "eps": self.eps, "sign_split": cells}
 
     def _state(self) -> dict[str, NDArray[Any]]:
+        if self._plant is not None:
+            raise TypeError("the observer has a nonlinear model, with which it cannot be saved yet")
         window, lost = self._window, self._lost
         horizon = -1.0 if self.horizon is None else self.horizon
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
@@ -232,6 +248,7 @@ class WindowObserver(Observer):
         return state | self._form.state_dict() | window.state()
 
     def _set_up(self, model: UncertainModel, state: Mapping[str, NDArray[Any]]) -> None:
+        self.model, self._plant = model, None
         horizon, _, eps, cells = (float(v) for v in state["settings"])
         form, steps = NormalForm.from_state_dict(model, state), None if horizon < 0 else int(horizon)
         template = numbers(state, "template", "r", model.n_states)
@@ -285,7 +302,7 @@ class WindowObserver(Observer):
     def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | None:
         """Samples of a log for one call of the kernel; None where the next one needs more than that."""
         gone = self._lost or self._alarm is not None or self._readings is not None or self._missing.any()
-        if gone:
+        if gone or self._plant is not None:
             return None
         last = min(first + min(count, self._window.takes_at_once), len(log))
         return log_samples(self._form, log, first, last, self._wants_next_input)
@@ -322,6 +339,9 @@ class WindowObserver(Observer):
     def _sample(self, u: Array, u_next: Array, y: Array, schedule: Any) -> Sample:
         """Model and data of a sample, in normal form."""
         form = self._form
+        if self._plant is not None:
+            schedule, y = self._plant.measured(y, u_next, self._number)
+            u = u_next = np.zeros(0)  # they are in the linearisations
         stack, (w_lower, w_upper, noise) = self._normal.stack(schedule), self._normal.bounds(schedule)
         u_next = form.inputs(u_next) if self._wants_next_input else u_next  # else zeros
         return Sample(form.inputs(u), u_next, form.outputs(y), stack, noise, w_lower, w_upper, y)
@@ -340,8 +360,27 @@ class WindowObserver(Observer):
             return self._give_up(sample)
         return verdict if verdict == "falsified" else self._watch(sample, verdict)
 
+    def _relinearise(self, plant: Relinearised, u: Array) -> None:
+        """Hand over the transition from the newest sample; where there is none, the set starts again."""
+        n = self.model.n_states
+        try:
+            if self._lost:
+                raise Undecided(OUTGROWN)
+            lower, upper = self._newest_bounds(self._window)
+            at = plant.moved(Span(lower[:n] * self._form.x, upper[:n] * self._form.x), u)
+        except Undecided as error:
+            box = plant.give_up(error, self._number)
+            self._adopt(
+                self._new_window(ArrivalSet.box(box.lower / self._form.x, box.upper / self._form.x), self._number)
+            )
+            self.largest_at = self._number
+        else:
+            self._window.move_by(self._normal.stack(at))
+
     def _said(self, verdict: VerdictName) -> WindowStep:
         reason = (OUTGROWN if self._lost else self._window.reason) if verdict == "undecided" else None
+        if self._plant is not None and self._plant.reason is not None and verdict != "falsified":
+            verdict, reason = "undecided", self._plant.reason
         proof = None if self._window.proof is None else self._window.proof.resting_on(self.largest_at)
         return WindowStep(self, verdict=verdict, certificate=proof, reason=reason)
 
@@ -389,6 +428,8 @@ class WindowObserver(Observer):
         self._window = Window(self._settings, self._window.anchor, prover=self.prover)
 
     def _without_set(self, sample: Sample) -> VerdictName:
+        if self._plant is not None:
+            return "undecided"  # until the next sample starts again from the largest set
         assert self._readings is not None
         readings = self._readings.added(sample.u, sample.reading)
         verdict = self._start_from(readings)
@@ -419,6 +460,8 @@ class WindowObserver(Observer):
 
     def _watch(self, sample: Sample, verdict: VerdictName) -> VerdictName:
         """Look for readings that bound the state better than a set that a gap has blurred."""
+        if self._plant is not None:
+            return verdict
         if self._readings is None:
             if not (any(map(math.isnan, sample.y.tolist())) or any(self._missing.tolist())):  # short: fastest so
                 return verdict

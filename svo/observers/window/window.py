@@ -178,6 +178,11 @@ class Window:
             return _NO_END
         return memory.size.N - memory.time - 1 if memory.started else memory.size.N
 
+    def move_by(self, stack: Array) -> None:
+        """Replace the transition from the newest sample, which is read at the next one, by that of a stack."""
+        n = self._model.n_states
+        self.memory.arrays["stack"][self.memory.slot, 0, :n] = stack[0, :n]
+
     def add_late(self, y: Array, sample: int) -> VerdictName:
         """A measurement of a sample that is still there."""
         own, memory, self.reason = sample - self.origin, self.memory, None

@@ -1,0 +1,90 @@
+"""A nonlinear model in a window: each sample is linearised over the set that is known there, with a proven remainder.
+
+The set of a sample is the window's once it has read the sample, so the transition from it is known only then: it is
+handed over afterwards, before the window takes the next sample. Everything here is in the user's units.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from svo.checks import Array
+from svo.models.nonlinear import Linearisation, LinearOutput, NonlinearModel, Span, Undecided, cut
+
+OUTSIDE_MODEL = "outside"  # how a reason begins that a sample is not linearised
+_BLUNT = 1e-3  # of the noise: a remainder of the output beyond it is worth a second linearisation over what is left
+
+
+class Relinearised:
+    """What a window observer asks of a nonlinear model at each sample.
+
+    Parameters
+    ----------
+    model : NonlinearModel
+
+    Attributes
+    ----------
+    box : Span
+        Known of the newest state besides what the window knows.
+    reason : str or None
+        Why the newest sample was not linearised.
+    """
+
+    def __init__(self, model: NonlinearModel) -> None:
+        self.model, self.reason = model, None
+        self.start_from(Span(model.start_range.lower, model.start_range.upper))
+        self._now: Linearisation | None = None
+
+    reason: str | None
+
+    def start_from(self, box: Span) -> None:
+        """Nothing is known of the newest state but a box."""
+        self.box = box
+
+    def moved(self, known: Span, u: Array) -> Linearisation:
+        """The newest sample with the transition from it, whose states are in a box that the window knows.
+
+        Raises
+        ------
+        Undecided
+            As `NonlinearModel.transition`.
+        """
+        self.reason = None
+        lower, upper = np.maximum(known.lower, self.box.lower), np.minimum(known.upper, self.box.upper)
+        if not (lower <= upper).all():  # only the window's programs raise an alarm
+            lower, upper = known
+        assert self._now is not None
+        found = self.model.transition(lower, upper, u)
+        self.box = found.box
+        return self._now.moved(found)
+
+    def give_up(self, why: Undecided, sample: int) -> Span:
+        """The box from which the set starts again where a transition to a sample is not enclosed."""
+        self.reason = f"{OUTSIDE_MODEL}: at sample {sample}, {why}"
+        largest = self.model.start_range
+        self.start_from(Span(largest.lower, largest.upper))
+        return self.box
+
+    def measured(self, y: Array, u: Array, sample: int) -> tuple[Linearisation, Array]:
+        """The newest sample without a transition, and its readings: none where the output is not enclosed."""
+        model = self.model
+        try:
+            output = self._cut(y, u)
+        except Undecided as error:
+            self.reason = self.reason or f"{OUTSIDE_MODEL}: at sample {sample}, {error}"
+            output = LinearOutput(np.zeros((len(y), model.n_states)), np.zeros(len(y)), np.zeros(len(y)))
+            y = np.full(len(y), np.nan)
+        self._now = Linearisation.before(output, model.noise, len(model.flow.w.lower))
+        return self._now, y
+
+    def _cut(self, y: Array, u: Array) -> LinearOutput:
+        """The output over the box, which it cuts; again over what is left where its remainder blurs the readings."""
+        noise = self.model.noise
+        output = self.model.output(self.box.lower, self.box.upper, u)
+        left = cut(self.box, y, output, noise)
+        if left is not None and (output.R - _BLUNT * noise > 0.0).any():
+            output = self.model.output(left.lower, left.upper, u)
+            left = cut(left, y, output, noise)
+        if left is not None:
+            self.box = left
+        return output
