@@ -37,6 +37,13 @@ def writable_csv(path: Path | None) -> Path | None:
     return writable_file(path)
 
 
+def writable_parquet(path: Path | None) -> Path | None:
+    """A Parquet file."""
+    if path is not None and path.suffix.lower() != ".parquet":
+        fail(f"{path} has the suffix {path.suffix!r}; expected .parquet, the format that keeps where a log comes from")
+    return writable_file(path)
+
+
 def writable_file(path: Path | None) -> Path | None:
     """A file that can be written in a folder that exists."""
     if path is None:

@@ -24,12 +24,13 @@ def write_parquet(path: Path, cells: Mapping[str, Array], told: Mapping[str, str
     parquet.write_table(table, path, write_page_checksum=True, row_group_size=4 * ROWS)
 
 
-def told_in(path: Path) -> dict[str, str]:
-    """What stands in a file beside its columns, by key."""
+def told_in(path: Path, key: str) -> str | None:
+    """What is told of a file's columns by that key; None if nothing is."""
     arrow, parquet = _arrow()
     with path.open("rb") as file, _one_error(path, arrow):
         found = parquet.ParquetFile(file).schema_arrow.metadata or {}
-        return {key.decode(): value.decode() for key, value in found.items()}
+        text = found.get(key.encode())
+        return None if text is None else text.decode()
 
 
 def read_table(path: Path) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from svo.logs.columns import LogNote
 from svo.logs.dialect.read import noted, read_dialect
 from svo.logs.log import Log
 from svo.plant.dialects import dialect_of
+from svo.plant.imported import Told, told_of
 from svo.plant.protocol import MonitoredPlant, expect_plant
 
 
@@ -76,7 +78,23 @@ def check_measured(path: str | Path, plant: MonitoredPlant, missing: NDArray[np.
 
 
 def _read(path: str | Path, plant: MonitoredPlant) -> Log:
-    dialect = dialect_of(plant)
-    if dialect is None:
-        return file.read_log(path, plant.columns, plant.Ts)
+    dialect, imported = dialect_of(plant), imported_log(path, plant)
+    if dialect is None or imported is not None:
+        log = file.read_log(path, plant.columns, plant.Ts)
+        return log if imported is None else replace(log, widening=imported.wider)
     return noted(read_dialect(path, plant.columns, plant.Ts, dialect), path)
+
+
+def imported_log(path: str | Path, plant: MonitoredPlant) -> Told | None:
+    """What a log that ``svo import`` wrote for a ``plant`` says of itself, which is noted; None for others."""
+    told = told_of(path)
+    if told is None:
+        return None
+    dialect = dialect_of(plant)
+    warnings.warn(f"{path} was {told}", LogNote, stacklevel=4)
+    if told.log != (None if dialect is None else dialect.stated):
+        warnings.warn(f"{path} was imported by another [log] table than that of {plant.name}", LogNote, stacklevel=4)
+    if told.widening is not None and len(told.widening) != len(plant.columns.outputs):
+        wanted = f"{len(plant.columns.outputs)}, as {plant.name} has"
+        raise ValueError(f"{path} was imported for {len(told.widening)} outputs; expected {wanted}")
+    return told

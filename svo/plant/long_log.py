@@ -13,7 +13,7 @@ from svo.checks import Array
 from svo.logs import file
 from svo.logs.log import Log
 from svo.plant.dialects import dialect_of
-from svo.plant.log_file import check_measured, read_log
+from svo.plant.log_file import check_measured, imported_log, read_log
 from svo.plant.protocol import MonitoredPlant, expect_plant
 
 
@@ -33,6 +33,8 @@ class LongLog:
         Samples without a measurement of each sensor.
     kept : Log or None
         The log itself where it cannot be read in portions: a `[log]` table of the plant sets it on its grid.
+    widening : (ny,) array or None
+        As that of a `Log`.
     """
 
     path: Path
@@ -42,12 +44,8 @@ class LongLog:
     end_s: float
     missing: NDArray[np.int64]
     kept: Log | None = None
+    widening: Array | None = None
     _state: tuple[int, int] = field(default=(0, 0), repr=False)
-
-    @property
-    def widening(self) -> Array | None:
-        """As that of a `Log`."""
-        return None if self.kept is None else self.kept.widening
 
     def portions(self) -> Iterator[Log]:
         """The portions, one after the other, without notes.
@@ -94,10 +92,11 @@ def survey_log(path: str | Path, plant: MonitoredPlant) -> LongLog:
     """
     expect_plant(plant)
     path = Path(path)
-    if dialect_of(plant) is not None:
+    imported = imported_log(path, plant)
+    if dialect_of(plant) is not None and imported is None:
         log = read_log(path, plant)
         missing = np.isnan(log.y).sum(axis=0)
-        return LongLog(path, plant, len(log), float(log.time[0]), float(log.time[-1]), missing, log)
+        return LongLog(path, plant, len(log), float(log.time[0]), float(log.time[-1]), missing, log, log.widening)
     samples, begin, end = 0, 0.0, 0.0
     missing = np.zeros(len(plant.columns.outputs), dtype=np.int64)
     before = _state_of(path)
@@ -107,7 +106,8 @@ def survey_log(path: str | Path, plant: MonitoredPlant) -> LongLog:
         samples += len(portion)
         missing += np.isnan(portion.y).sum(axis=0)
     check_measured(path, plant, missing, samples)
-    return LongLog(path, plant, samples, begin, end, missing, _state=before)
+    widening = None if imported is None else imported.wider
+    return LongLog(path, plant, samples, begin, end, missing, None, widening, before)
 
 
 def _state_of(path: Path) -> tuple[int, int]:

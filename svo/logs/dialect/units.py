@@ -45,6 +45,4 @@ def _unit(registry: Any, text: str) -> Any:
 
 @cache
 def _registry() -> Any:
-    registry = optional_import("pint", "logs", "units in [log]").UnitRegistry()
-    registry.define("@alias degree_Celsius = °C")
-    return registry
+    return optional_import("pint", "logs", "units in [log]").UnitRegistry()
