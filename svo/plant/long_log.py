@@ -99,7 +99,7 @@ def survey_log(path: str | Path, plant: MonitoredPlant) -> LongLog:
         return LongLog(path, plant, len(log), float(log.time[0]), float(log.time[-1]), missing, log, log.widening)
     samples, begin, end = 0, 0.0, 0.0
     missing = np.zeros(len(plant.columns.outputs), dtype=np.int64)
-    before = _state_of(path)
+    before = _state_of(path) if path.exists() else (0, 0)  # reading says best what is wrong with a path
     for portion in file.read_portions(path, plant.columns, plant.Ts):
         begin = begin if samples else float(portion.time[0])
         end = float(portion.time[-1])
