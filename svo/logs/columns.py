@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
+from svo.logs.dialect.dates import suggested
 from svo.logs.names import Column, Columns
 
 Place = Callable[[int], str]
@@ -27,6 +28,11 @@ Note = Callable[[str], None]
 # Relative: a step is taken for Ts if |step - Ts| <= 0.01 Ts. The model then reckons with Ts: what the difference does
 # to the plant is for the user's bounds to hold, no set is widened by it.
 TIME_TOLERANCE = 0.01
+
+_UNITS = {
+    "ms": ("milliseconds", 1e-3), "us": ("microseconds", 1e-6), "ns": ("nanoseconds", 1e-9), "min": ("minutes", 60.0),
+    "h": ("hours", 3600.0), "day": ("days", 86400.0), "100ns": ("units of 100 ns", 1e-7),
+}  # fmt: skip
 
 
 class LogNote(UserWarning):
@@ -79,6 +85,9 @@ def may_be_missing(columns: Columns) -> frozenset[str]:
 
 def not_finite(where: str, cell: object) -> ValueError:
     hint = "; write a decimal point" if isinstance(cell, str) and "," in cell else ""
+    dates = suggested(cell) if isinstance(cell, str) else []
+    if dates:
+        hint = f'; write seconds, or state time = {{ column = ..., format = "{dates[0][0]}" }} in [log]'
     return ValueError(f"{where}: {cell!r} is not a finite number{hint}")
 
 
@@ -134,9 +143,11 @@ def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError
     if after <= before:
         return ValueError(f"{step}; expected increasing times, so sort the rows and drop doubles")
     found = f"{step}, a step of {after - before:.6g} s; expected the model's sampling time {Ts:.6g} s. "
-    for unit, seconds in (("milliseconds", 1e-3), ("microseconds", 1e-6)):
+    for unit, (name, seconds) in _UNITS.items():
         if is_sampled(before * seconds, after * seconds, Ts):
-            return ValueError(f"{found}The column seems to be in {unit}; divide it by {1 / seconds:g}")
+            change = f"divide it by {1 / seconds:g}" if seconds < 1 else f"multiply it by {seconds:g}"
+            stated = f'{change}, or state unit = "{unit}" in [log.time]'
+            return ValueError(f"{found}The column seems to be in {name}; {stated}")
     return ValueError(f"{found}Resample the log; a lost sample is a row with empty sensor cells")
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from svo.logs.columns import Array, Note, may_be_missing, not_finite, not_there, noted, wanted_columns
+from svo.logs.dialect.hints import seems_written
 from svo.logs.lines import Lines
 from svo.logs.names import Columns
 from svo.logs.portions import Rows
@@ -53,8 +54,9 @@ def read_csv(
     """
     with path.open("rb") as file, csv_errors(str(path)):
         lines = Lines(str(path), file, block, note)
-        header = next((row for row in csv.reader(lines, **DIALECT) if row), [])
-        parser = RowParser(str(path), header, columns)
+        with _hinted(path):
+            header = next((row for row in csv.reader(lines, **DIALECT) if row), [])
+            parser = RowParser(str(path), header, columns)
         is_long = os.fstat(file.fileno()).st_size > quick_from
         while lines.block():
             quick = _quick_rows(lines, parser) if is_long else None
@@ -168,6 +170,16 @@ def _check_separator(source: str, present: Sequence[str], columns: Columns) -> N
                 f"{source} has no column {columns.time!r}: its header {present[0]!r} is split by {name}; "
                 "expected commas between the cells, and a decimal point in numbers"
             )
+
+
+@contextmanager
+def _hinted(path: Path) -> Iterator[None]:
+    """Say of a header that is none how the file seems to be written."""
+    try:
+        with csv_errors(str(path)):
+            yield
+    except ValueError as error:
+        raise ValueError(f"{error}{seems_written(path)}") from error
 
 
 @contextmanager

@@ -173,12 +173,14 @@ class _Feed:
         self._first = dialect.first_row or (dialect.header or 0) + 1
         if dialect.header is None and not dialect.names:
             self._first = 1
-        self._blanks = dialect.separator == " "
+        self._separator, self._blanks = dialect.separator, dialect.separator == " "
         self.begin: int | None = None
         self.skipped = 0
 
     def __iter__(self) -> Iterator[str]:
         for number, line in enumerate(self._lines[self._first - 1 :], start=self._first):
+            if number == 1 and line.strip() == f"sep={self._separator}":
+                continue  # a spreadsheet's word on what is stated
             if any(pattern.search(line) for pattern in self._skip):
                 self.skipped += 1
                 continue

@@ -19,6 +19,7 @@ COLUMNS = Columns(
 )
 HEADER = "time_s,flow,gauge_1,gauge_2,level\n"
 GOOD = HEADER + "0.0,1,2,3,4\n0.1,1,2,3,4\n0.2,1,2,3,4\n"
+QUOTED = GOOD.replace(",", '","').replace("\n", '"\n"').join(('"', ""))[:-1]
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -106,6 +107,14 @@ def test_an_unknown_state_is_no_error(tmp_path: Path) -> None:
         (GOOD.replace("0.2", "0.3"), ["line 4", "step of 0.2 s", "sampling time 0.1 s"]),
         (GOOD.replace("0.1,", "100,"), ["line 3", "The column seems to be in milliseconds; divide it by 1000"]),
         (GOOD.replace("0.1,", "100000,"), ["line 3", "seems to be in microseconds; divide it by 1e+06"]),
+        (GOOD.replace("0.1,", "100000000,"), ["in nanoseconds; divide it by 1e+09", 'unit = "ns" in [log.time]']),
+        (GOOD.replace("0.1,", "0.00166666667,"), ["in minutes; multiply it by 60", 'unit = "min"']),
+        (GOOD.replace("\n0.0,", "\n2025-03-14T10:15:00Z,"), ["line 2", "write seconds", 'format = "iso"']),
+        (QUOTED.replace(",", ";"), ["seems to be written with semicolons between the cells", "--guess"]),
+        ("sep=;\n" + GOOD.replace(",", ";"), ["with semicolons between the cells", "with the names in line 2"]),
+        ("Logger 5\n\n" + GOOD, ["with the names in line 3", "svo import"]),
+        (GOOD.replace(",", ";").replace(".", ","), ["semicolons", "with decimal commas"]),
+        (GOOD.encode("utf-16"), ["not a CSV text file", "seems to be written in utf-16-le"]),
         (b"\xff\xfe\x00\x01time", ["not a CSV text file"]),
         (b"PK\x03\x04\x00\x9c\xff", ["not a CSV text file"]),
     ],

@@ -39,6 +39,7 @@ def positions(found: Reading) -> list[float]:
         ("t;f;p\n0;1;2\n0,1;1;3\n", stated('separator = ";"', 'decimal = ","')),
         ("t\tf\tp\n0\t1\t2\n0.1\t1\t3\n", stated('separator = "\\t"')),
         ("t   f  p\n  0 1\t 2 \n 0.1  1 3\n", stated('separator = " "')),
+        ("sep=;\nt;f;p\n0;1;2\n0.1;1;3\n", stated('separator = ";"')),
         ("t|f|p\n0|1|2\n0.1|1|3\n", stated('separator = "|"')),
         ('"t","f","p"\n"0","1","2"\n"0.1","1","3"\n', PLAIN),
         ("t, f, p\r\n0, 1, 2\r\n\r\n0.1, 1, 3\r\n,,\r\n", PLAIN),
