@@ -7,10 +7,12 @@ that JSON stays JSON; what the terminal's encoding cannot say is shown the same 
 from __future__ import annotations
 
 import io
+import json
+import math
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -34,6 +36,19 @@ def plain(text: str) -> str:
 def line(text: str) -> str:
     """The text as one line: line feeds and tabs are shown too."""
     return plain(text).replace("\n", "\\u000a").replace("\t", "\\u0009")
+
+
+def json_text(value: Any, indent: int | None = None) -> str:
+    """A value as JSON, in which NaN and infinities, which JSON has not, are null."""
+    return json.dumps(_without_nan(value), indent=indent, allow_nan=False)
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from svo.cli.destinations import writable_csv, writable_folder
+from svo.cli.destinations import check_new, writable_csv, writable_folder
 from svo.cli.frame import (
     KEPT,
     app,
@@ -24,6 +24,7 @@ from svo.cli.options import (
     FlightSeed,
     Limit,
     NoiseName,
+    Overwrite,
     PlantName,
     RetryFailed,
     Scheduler,
@@ -87,6 +88,7 @@ def design_input(
     out: Annotated[
         Path | None, typer.Option(metavar="INPUT.csv", callback=writable_csv, help="CSV file of the designed inputs.")
     ] = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Design the input of (locally) least energy that isolates a fault for certain within a number of samples.
@@ -96,13 +98,16 @@ def design_input(
 
     \b
     Example:
-      svo design-input eclipse --fault elevator --size 0.3 --horizon 10 --hold 5 --noise conservative
+      svo design-input eclipse --fault elevator --size 0.3 --horizon 10
     """
     from svo.analysis.plant_input import plant_input
+    from svo.cli.progress import busy
 
+    check_new(out, overwrite)
     the_plant = plant_to_simulate(plant)
     noise = chosen_noise(the_plant, noise)
-    found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
+    with busy("Designing an input"):
+        found = plant_input(the_plant, noise, fault, horizon, inputs=only or (), hold=hold, size=size, seed=seed)
     if as_json:
         print_json(found.to_dict())
     else:
@@ -142,6 +147,7 @@ def compare(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same comparison in DIR after an interruption.")
     ] = False,
+    overwrite: Overwrite = False,
     retry_failed: RetryFailed = False,
     scheduler: Scheduler = None,
     limit: Limit = None,
@@ -156,7 +162,7 @@ def compare(
     \b
     Example:
       svo compare eclipse --runs 50 --seed 0 --workers 2 --out comparison
-      svo compare elevator --noise quiet --runs 20 --healthy-runs 50 --out comparison
+      svo compare elevator --runs 20 --healthy-runs 50 --out comparison
     """
     from dataclasses import replace
 
@@ -164,6 +170,7 @@ def compare(
     from svo.cli.progress import progress
     from svo.studies.comparison.comparison import DISTRIBUTIONS, Comparison, run_comparison
     from svo.studies.comparison.publish import publish_comparison, to_text
+    from svo.studies.comparison.store import clear_comparison
 
     the_plant = plant_to_simulate(plant)
     noise = chosen_noise(the_plant, noise)
@@ -173,6 +180,8 @@ def compare(
     comparison = Comparison(plant, noise, runs=runs, seed=seed, rate=rate, distributions=chosen)
     if healthy_runs is not None:
         comparison = replace(comparison, healthy_calibration=healthy_runs, healthy_runs=healthy_runs)
+    if overwrite:
+        clear_comparison(out, resume)
     with progress("Parts") as update:
         compared = run_comparison(
             comparison,

@@ -56,6 +56,12 @@ def writable_file(path: Path | None) -> Path | None:
     return path
 
 
+def check_new(path: Path | None, overwrite: bool) -> None:
+    """Refuse to write over a file, unless that is asked for."""
+    if path is not None and os.path.lexists(path) and not overwrite:
+        raise ValueError(f"{path} is there already, and nothing is overwritten; give another name, or --overwrite")
+
+
 def _need_access(path: Path, holder: Path) -> None:
     if not os.access(holder, os.W_OK | os.X_OK if holder.is_dir() else os.W_OK):
         fail(f"{path} cannot be written: no permission to write to {holder}; choose another place")

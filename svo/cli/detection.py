@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
@@ -10,8 +11,8 @@ import typer
 
 import svo as face
 from svo.cli.destinations import writable_file, writable_folder
-from svo.cli.frame import announce, app, chosen_noise, note, one_line_errors
-from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName, positive
+from svo.cli.frame import app, chosen_noise, note, one_line_errors
+from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName, Overwrite, positive
 from svo.cli.output import print_json, say
 
 
@@ -25,9 +26,10 @@ def detect(
         typer.Option(
             metavar="DIR",
             callback=writable_folder,
-            help="Folder for alarms.jsonl and verdict.json; nothing in it is overwritten.",
+            help="Folder for alarms.jsonl and verdict.json.",
         ),
     ] = None,
+    overwrite: Overwrite = False,
     noise: NoiseName = None,
     architecture: Architecture = None,
     as_json: AsJson = False,
@@ -48,22 +50,23 @@ def detect(
     from svo.plant.long_log import survey_log
 
     if out is not None:
-        check_no_results(out)
+        check_no_results(out, overwrite)
     the_plant = face.find_plant(plant, architecture=architecture)
-    if out is not None:
+    if out is not None and not overwrite:
         check_kept_description(the_plant, out)
     noise = chosen_noise(the_plant, noise)
     samples = survey_log(log, the_plant)
     with progress("Samples") as update:
         found = detect_streamed(the_plant, samples, noise, progress=update)
     if out is not None:
-        found.save(out)
+        found.save(out, overwrite=overwrite)
     if as_json:
         print_json(found.to_dict())
         return
     typer.echo(str(found))
     if out is not None:
-        say(f"Alarms with certificates: {out / 'alarms.jsonl'}")
+        what = f"Alarms with certificates: {out / 'alarms.jsonl'}; verdict" if found.alarms else "Verdict"
+        say(f"{what}: {out / 'verdict.json'}")
 
 
 @app.command()
@@ -79,6 +82,7 @@ def watch(
             help="Folder for alarms.jsonl, written as they are raised; those of the same watch before are kept.",
         ),
     ] = None,
+    overwrite: Overwrite = False,
     noise: NoiseName = None,
     until_end: Annotated[
         bool, typer.Option("--until-end", help="End where the file ends, instead of waiting for more.")
@@ -91,6 +95,7 @@ def watch(
         Path | None,
         typer.Option(metavar="FILE", help="Keep the state there, and go on from it when the watch is started again."),
     ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what happens as JSON, an object a line.")] = False,
 ) -> None:
     """Show live what a plant's isolation bank says about a log that is still growing.
 
@@ -110,6 +115,7 @@ def watch(
         from svo.cli.output import console
         from svo.detection.alarm_folder import watch_folder
         from svo.detection.watch.follow import lines_of
+        from svo.detection.watch.json_view import JsonView
         from svo.detection.watch.session import Session, identity_of
         from svo.detection.watch.silence import Silence
         from svo.detection.watch.state import resume_state, save_state
@@ -127,9 +133,10 @@ def watch(
         identity = identity_of(the_plant, noise, log)
         keep = save = None
         if out is not None:
-            check_kept_description(the_plant, out)
-            alarms = stack.enter_context(watch_folder(out, identity))
-            keep_description(the_plant, out)
+            if not overwrite:
+                check_kept_description(the_plant, out)
+            alarms = stack.enter_context(watch_folder(out, identity, overwrite))
+            keep_description(the_plant, out, overwrite)
             for text in alarms.notes:
                 note(text)
             if alarms.before:
@@ -137,12 +144,13 @@ def watch(
             keep = alarms.add
         if state is not None:
             writable_file(state)
-            if state.exists():
+            if state.exists() and not overwrite:
                 resume_state(state, session, lines, identity)
             save = partial(save_state, state, session, lines, identity)
         session.warm_up()
         quiet = None if silence is None else Silence(silence)
-        run_watch(lines, session, view_of(console(), session), keep=keep, save=save, silence=quiet)
+        view = JsonView(sys.stdout, session) if as_json else view_of(console(), session)
+        run_watch(lines, session, view, keep=keep, save=save, silence=quiet)
 
 
 @app.command()
@@ -162,13 +170,14 @@ def calibrate(
     Example:
       svo calibrate eclipse log.csv --noise quiet
     """
+    from svo.cli.progress import busy
     from svo.detection.log_calibration import calibrate_log
 
     the_plant = face.find_plant(plant)
     noise = chosen_noise(the_plant, noise)
     samples = face.read_log(log, the_plant)
-    announce("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)")
-    found = calibrate_log(the_plant, samples, noise)
+    with busy("Solving elastic programs (a minute for each thousand samples if many bounds are too narrow)"):
+        found = calibrate_log(the_plant, samples, noise)
     if as_json:
         print_json(found.to_dict())
     else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -17,21 +17,48 @@ if TYPE_CHECKING:
 
 
 class _SafeGroup(TyperGroup):
-    """Commands whose output, usage errors included, goes through `svo.terminal`."""
+    """Commands whose output, usage errors included, goes through `svo.terminal`; their list is not cut."""
 
     def main(self, *arguments: Any, **options: Any) -> Any:
         with safe_output():
             return super().main(*arguments, **options)
 
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        said = ((name, self.get_command(ctx, name)) for name in self.list_commands(ctx))
+        rows = [(name, (command.help or "").split("\n\n")[0].strip()) for name, command in said if command is not None]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"svo {version('svo-fdi')}")
+        raise typer.Exit
+
 
 app = typer.Typer(
     cls=_SafeGroup,
-    help="Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.",
+    context_settings={"help_option_names": ["-h", "--help"]},
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+@app.callback()
+def _svo(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Set-membership fault detection and isolation: studies, simulation, detection on logs, proofs of alarms.
+
+    What exists is never overwritten, by no command, unless --overwrite is given. Progress is shown on a terminal, on
+    standard error; NO_COLOR=1 leaves out colours. The exit code is 0 only on success.
+    """
+
 
 _SHOWN = 10  # failures
 KEPT = "interrupted; what is done is kept, and the same command with --resume goes on"
@@ -46,8 +73,8 @@ def one_line_errors(interrupted: str = "interrupted") -> Iterator[None]:
     try:
         with _notes_in_lines():
             yield
-    except ReaderGoneError:
-        raise  # a quiet end: whoever read the output has had enough
+    except (ReaderGoneError, typer.Exit):
+        raise  # a quiet end: whoever read the output has had enough, or all is said
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
     except (ValueError, TypeError, RuntimeError, ImportError, OverflowError) as error:
@@ -119,7 +146,3 @@ def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:
     from svo.plant import chosen_noise as chosen
 
     return chosen(plant, noise)
-
-
-def announce(what: str) -> None:
-    typer.echo(f"{line(what)} ...", err=True)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from svo.terminal import line
+from svo.terminal import json_text, line
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,7 +55,7 @@ def say(text: str, err: bool = False) -> None:
 
 def print_json(value: Any) -> None:
     """Figures as JSON on standard output."""
-    typer.echo(json.dumps(value, indent=2))
+    typer.echo(json_text(value, indent=2))
 
 
 def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:

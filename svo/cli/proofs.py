@@ -44,7 +44,10 @@ def verify(
     """
     if log is not None and full is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")
-    found = face.verify(alarms, log or full, full=full is not None)
+    from svo.cli.progress import busy
+
+    with busy("Proving"):
+        found = face.verify(alarms, log or full, full=full is not None)
     if not found.checks:
         # Success would say that something was proven.
         raise ValueError(f"{alarms} holds no alarm, so there is nothing to prove: {_WHY_EMPTY}")

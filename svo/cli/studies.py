@@ -7,10 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from svo.cli.destinations import writable_folder, writable_log
+from svo.cli.destinations import check_new, writable_folder, writable_log
 from svo.cli.frame import (
     KEPT,
-    announce,
     app,
     chosen_noise,
     note,
@@ -23,6 +22,7 @@ from svo.cli.options import (
     AsJson,
     Limit,
     NoiseName,
+    Overwrite,
     PlantName,
     RetryFailed,
     Scheduler,
@@ -68,9 +68,7 @@ def study(
     plant: PlantName,
     out: Annotated[
         Path,
-        typer.Option(
-            metavar="DIR", callback=writable_folder, help="Folder of the results; new or empty, unless --resume."
-        ),
+        typer.Option(metavar="DIR", callback=writable_folder, help="Folder of the results; new or empty."),
     ],
     runs: Annotated[
         int, typer.Option(min=1, help="Runs of each noise set, fault and profile, and without a fault.")
@@ -97,6 +95,7 @@ def study(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
     ] = False,
+    overwrite: Overwrite = False,
     retry_failed: RetryFailed = False,
     as_json: AsJson = False,
 ) -> None:
@@ -108,14 +107,15 @@ def study(
 
     \b
     Example:
-      svo study eclipse --runs 10 --seed 0 --workers 2 --noise quiet --out results
-      svo study eclipse --runs 10 --architecture I --architecture II --out side_by_side
+      svo study eclipse --runs 10 --seed 0 --noise quiet --out results
+      svo study eclipse --runs 10 --architecture I --architecture II --out both
       svo study elevator --runs 200 --seed 0 --out results
     """
     from svo.checks import optional_import
 
     optional_import("pyarrow", "study", "studies")  # first: what is imported next needs the extra too
-    from svo.cli.progress import progress
+    from svo.cli.progress import busy, progress
+    from svo.studies.added import added_study
     from svo.studies.configuration import StudyConfiguration
     from svo.studies.isolation.runner import run_study
     from svo.studies.isolation.store import StudyFolder
@@ -126,6 +126,9 @@ def study(
     configuration = StudyConfiguration.for_plant(
         the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
     )
+    if overwrite:
+        added = added_study(the_plant, configuration)
+        StudyFolder(out).clear(resume, () if added is None else (added.name,))
     for line in StudyFolder(out).check(configuration, resume):
         note(line)
     learns = isinstance(the_plant, LearnsDetectors)
@@ -137,8 +140,8 @@ def study(
     }
     with progress("Runs") as update:
         folder = run(configuration, out, resume=resume, retry_failed=retry_failed, progress=update, **place)
-    announce("Writing summary, pictures and report")
-    show(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
+    with busy("Writing summary, pictures and report"):
+        show(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
     if not as_json:
         typer.echo(f"Report: {out / 'report.html'}")
     tell_failures(all_failures(folder, the_plant), "runs")
@@ -190,23 +193,26 @@ def simulate(
     out: Annotated[
         Path, typer.Option(metavar="LOG.csv", callback=writable_log, help="CSV, Parquet or MAT file to write.")
     ],
+    overwrite: Overwrite = False,
     fault: Annotated[str, typer.Option(metavar="NAME", help="Fault to simulate, or none.")] = "none",
     profile: Annotated[
         str | None, typer.Option(metavar="NAME", help="Shape of the fault in time. [default: the fault's first]")
     ] = None,
     noise: NoiseName = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; that of a row of runs.parquet gives that very run.")] = 0,
+    as_json: AsJson = False,
 ) -> None:
     """Simulate one run and write its log, true states included.
 
     \b
     Example:
-      svo simulate eclipse --fault elevator --profile step --noise quiet --seed 0 --out log.csv
+      svo simulate eclipse --fault elevator --profile step --out log.csv
     """
     from svo.logs.file import write_log
     from svo.plant import HEALTHY, fault_start
     from svo.studies.configuration import check_fault
 
+    check_new(out, overwrite)
     the_plant = plant_to_simulate(plant)
     noise = chosen_noise(the_plant, noise)
     if fault == HEALTHY:
@@ -221,6 +227,18 @@ def simulate(
     log = the_plant.simulate(fault, profile, noise, seed)
     write_log(out, log, the_plant.columns)
     start = fault_start(the_plant, fault, profile)
+    if as_json:
+        told = {"log": str(out), "samples": len(log), "Ts": the_plant.Ts, "plant": the_plant.name, "fault": fault}
+        print_json(
+            {
+                **told,
+                "profile": profile,
+                "fault_time_s": None if fault == HEALTHY else start,
+                "noise": noise,
+                "seed": seed,
+            }
+        )
+        return
     what = "no fault" if fault == HEALTHY else f"{fault} fault ({profile}) from {start:g} s"
     typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
 

@@ -1,6 +1,6 @@
 """Who may write alarms into a folder: nothing overwrites, joins or deletes an alarm file that it did not write itself.
 
-- ``svo detect`` writes into a folder without results, once.
+- ``svo detect`` writes into a folder without results; asked to overwrite, over those of its own.
 - ``svo watch`` does too, and leaves ``watch.json`` there, which says whose alarms these are: started again for the same
   log, plant and noise set it adds to them.
 - ``svo study`` joins what its own runs wrote, known by its SHA-256 (`svo.store.joined`).
@@ -26,14 +26,28 @@ _RESULTS = (ALARMS, VERDICT, _WATCH, "study.json", "comparison.csv")
 _FORMAT = "svo-watch-1"
 
 
-def check_no_results(folder: Path) -> None:
-    """Raise a ValueError if a folder holds what a command wrote, or a link in the place of that."""
+def check_no_results(folder: Path, overwrite: bool = False) -> None:
+    """Raise a ValueError if a folder holds what a command wrote, or a link in the place of that.
+
+    To ``overwrite`` says that those of ``svo detect`` may be there.
+    """
     found = [name for name in _RESULTS if os.path.lexists(folder / name)]
+    if overwrite and VERDICT in found and {*found} <= {ALARMS, VERDICT} and all(_is_file(folder / n) for n in found):
+        return
     if found:
         raise ValueError(
-            f"{folder} holds results already ({', '.join(found)}), and these are never overwritten; "
-            "give another folder, or move them away first"
+            f"{folder} holds results already ({', '.join(found)}), and these are never overwritten"
+            + (
+                ", since they are not those of svo detect; "
+                if overwrite
+                else "; --overwrite replaces what the same command wrote before, else "
+            )
+            + "give another folder, or move them away first"
         )
+
+
+def _is_file(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink()
 
 
 class WatchFolder:
@@ -88,7 +102,7 @@ def _append(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def watch_folder(folder: Path, identity: Mapping[str, str]) -> Iterator[WatchFolder]:
+def watch_folder(folder: Path, identity: Mapping[str, str], overwrite: bool = False) -> Iterator[WatchFolder]:
     """Open the folder of a watch, for one process at a time.
 
     Parameters
@@ -97,6 +111,8 @@ def watch_folder(folder: Path, identity: Mapping[str, str]) -> Iterator[WatchFol
         Made if need be.
     identity : mapping
         Plant, noise set and log: what the watch that wrote the folder must have been about.
+    overwrite : bool
+        Begin anew, without the alarms of a watch before, whatever it was about.
 
     Raises
     ------
@@ -105,16 +121,18 @@ def watch_folder(folder: Path, identity: Mapping[str, str]) -> Iterator[WatchFol
         writing into it.
     """
     about = {"format": _FORMAT, **identity}
-    _check_own(folder, about)
+    _check_own(folder, about, overwrite)
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
-        _check_own(folder, about)
+        _check_own(folder, about, overwrite)
+        for name in (ALARMS, _CUT, _WATCH) if overwrite else ():
+            (folder / name).unlink(missing_ok=True)
         if not (folder / _WATCH).exists():
             write_text(folder / _WATCH, json.dumps(about, indent=2) + "\n")
         yield WatchFolder(folder)
 
 
-def _check_own(folder: Path, about: Mapping[str, str]) -> None:
+def _check_own(folder: Path, about: Mapping[str, str], overwrite: bool) -> None:
     """Raise a ValueError unless a folder has no results, or those of a watch of the same."""
     path = folder / _WATCH
     if not os.path.lexists(path):
@@ -130,8 +148,10 @@ def _check_own(folder: Path, about: Mapping[str, str]) -> None:
     if not isinstance(stored, dict) or stored.get("format") != _FORMAT:
         raise ValueError(f"{path} is not that of a watch (format {_FORMAT}); give another folder")
     different = differences(stored, about)
-    if different:
-        raise ValueError(f"{folder} holds the alarms of another watch ({different}); give another folder")
+    if different and not overwrite:
+        raise ValueError(
+            f"{folder} holds the alarms of another watch ({different}); give another folder, or --overwrite"
+        )
 
 
 def differences(stored: Mapping[str, str], now: Mapping[str, str]) -> str:

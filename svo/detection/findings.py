@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from polytopes.shown import Shown, in_a_line
+from polytopes.signatures import options_by_name
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
 from svo.interval.on_log import ThresholdDetection
 from svo.isolation import Alarm, write_alarms
 from svo.plant import MonitoredPlant
 from svo.plant.description import check_kept_description, keep_description
 from svo.store import write_text, write_whole
-from svo.terminal import line
+from svo.terminal import json_text, line
 
 
 class ChangeAt(NamedTuple):
@@ -114,7 +114,8 @@ class Findings(Shown, ABC):
             "changes": [{"time_s": c.time, "state": c.state, "alive": list(c.alive)} for c in self.changes],
         } | ({} if self.thresholds is None else {"interval_detector": self.thresholds.to_dict()})
 
-    def save(self, folder: str | Path) -> None:
+    @options_by_name
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> None:
         """Write alarms.jsonl (with certificates) and verdict.json into a folder, which is made if need be.
 
         A plant's description is copied beside them, so that `svo.verify` finds the model that they are about.
@@ -122,19 +123,23 @@ class Findings(Shown, ABC):
         Parameters
         ----------
         folder : path
+        overwrite : bool
+            Replace what was saved there before.
 
         Raises
         ------
         ValueError
-            If the folder holds results already, or another description; nothing is overwritten.
+            If the folder holds results already, or another description; where these are to be overwritten, if it
+            holds those of another command.
         """
         folder = Path(folder)
-        check_no_results(folder)
-        check_kept_description(self.plant, folder)
+        check_no_results(folder, overwrite)
+        if not overwrite:
+            check_kept_description(self.plant, folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_whole(folder / ALARMS, lambda file: write_alarms(file, self.alarms))
-        write_text(folder / VERDICT, json.dumps(self.to_dict(), indent=2) + "\n")
-        keep_description(self.plant, folder)
+        write_text(folder / VERDICT, json_text(self.to_dict(), indent=2) + "\n")
+        keep_description(self.plant, folder, overwrite)
 
     def __str__(self) -> str:
         return "\n".join(line(text) for text in self._lines())

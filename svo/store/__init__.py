@@ -1,5 +1,6 @@
 """Folders of results that survive kills, copies and damage; they know nothing of what is stored in them."""
 
+from svo.store.clear import clear_results
 from svo.store.csv_file import write_csv
 from svo.store.identity import Identity
 from svo.store.joined import Joined
@@ -13,6 +14,7 @@ __all__ = [
     "Joined",
     "Parts",
     "Survey",
+    "clear_results",
     "digest_of",
     "file_name",
     "locked",

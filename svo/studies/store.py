@@ -13,7 +13,18 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic
 
-from svo.store import Identity, Joined, Parts, Survey, digest_of, locked, make_folder, versions, write_whole
+from svo.store import (
+    Identity,
+    Joined,
+    Parts,
+    Survey,
+    clear_results,
+    digest_of,
+    locked,
+    make_folder,
+    versions,
+    write_whole,
+)
 from svo.store.lock import check_free
 from svo.store.parts import Row, part_name
 from svo.studies.attempt import Failed
@@ -60,6 +71,15 @@ class StudyStore(Generic[Row]):
             return []
         check_free(self.path)
         return self._check_content(configuration, resume)
+
+    def clear(self, resume: bool, added: Sequence[str] = ()) -> None:
+        """Remove a study from its folder, so that another one can begin there.
+
+        ``added`` names the folders of what its plant adds to a study; errors as `svo.store.clear_results`.
+        """
+        expect_one_way(resume)
+        own = ("runs.parquet", "alarms*", "exemplars", "*.csv", "*.png", "*.html", *added)
+        clear_results(self.path, self._identity.name, own)
 
     @contextmanager
     def open(
@@ -196,7 +216,8 @@ class StudyStore(Generic[Row]):
             return []
         if not resume:
             raise ValueError(
-                f"{self.path} is not empty; give --resume to go on with the study in it, or another folder"
+                f"{self.path} is not empty; give --resume to go on with the study in it, --overwrite to begin another "
+                "one in its place, or another folder"
             )
         self._check_same(configuration)
         self._joined.check()
@@ -210,6 +231,12 @@ class StudyStore(Generic[Row]):
                 f"{self.path} is not empty and holds no study (study.json is missing); choose another folder"
             )
         self._stored().check_same(_identity(configuration), self.path)
+
+
+def expect_one_way(resume: bool) -> None:
+    """Refuse to go on with a study that is to be overwritten."""
+    if resume:
+        raise ValueError("--resume and --overwrite were both given; go on with what is there, or begin anew")
 
 
 def _identity(configuration: StudyConfiguration, runs: int | None = None) -> Identity:

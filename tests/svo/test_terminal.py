@@ -17,7 +17,7 @@ from rich.text import Text
 from typer.testing import CliRunner
 
 from svo.cli import app
-from svo.plant import load_plant
+from svo.plant.registry import made_by
 from svo.terminal import console, line, plain, safe_output
 
 CART = Path(__file__).parents[2] / "docs" / "examples" / "cart.toml"
@@ -99,12 +99,12 @@ def test_errors_are_shown_without_being_obeyed(hostile: tuple[Path, Path]) -> No
 def test_a_registered_plant_is_listed_without_being_obeyed(
     registered_tank: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def load(name: str) -> Any:
-        plant = load_plant(name)
+    def made(loader: Any, name: str) -> Any:
+        plant = made_by(loader, name)
         object.__setattr__(plant, "title", HOSTILE)
         return plant
 
-    monkeypatch.setattr("svo.plant.load_plant", load)
+    monkeypatch.setattr("svo.plant.registry.made_by", made)
     result = svo("plants")
     assert "\\u001b" in result.stdout
     assert_harmless(result.output)

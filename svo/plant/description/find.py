@@ -59,18 +59,19 @@ def check_kept_description(plant: MonitoredPlant, folder: Path) -> None:
             )
 
 
-def keep_description(plant: MonitoredPlant, folder: Path) -> None:
+def keep_description(plant: MonitoredPlant, folder: Path, overwrite: bool = False) -> None:
     """Copy the files that describe a plant beside its alarms, which name them; a registered plant has none.
 
     Raises
     ------
     ValueError
-        If another file stands there; it is not overwritten.
+        If another file stands there, unless it is to be overwritten.
     """
-    check_kept_description(plant, folder)
+    if not overwrite:
+        check_kept_description(plant, folder)
     for file, copy in _copies(plant, folder):
         copy.parent.mkdir(parents=True, exist_ok=True)
-        if not copy.exists():
+        if overwrite or not copy.exists():
             write_whole(copy, partial(shutil.copyfile, file))
 
 

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from svo.detectors.detector import Setting
-from svo.store import Identity, Parts, locked, make_folder, versions
+from svo.store import Identity, Parts, clear_results, locked, make_folder, versions
 from svo.store.tables import Json
 from svo.studies.comparison.run import ComparedRun
 from svo.studies.comparison.tuning import Tuned
+from svo.studies.store import expect_one_way
 
 FORMAT = "svo-comparison-2"
 
@@ -53,6 +54,12 @@ class ComparisonParts:
 
     tuned: Parts[TunedRow]
     judged: Parts[ComparedRun]
+
+
+def clear_comparison(out: Path, resume: bool) -> None:
+    """Remove a comparison from a folder, so that another one can begin there; errors as `svo.store.clear_results`."""
+    expect_one_way(resume)
+    clear_results(out, "comparison.json", ("tuned", "judged", "*.csv", "*.png"))
 
 
 @contextmanager
