@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 import svo as face
-from svo.cli.destinations import writable_parquet
+from svo.cli.destinations import check_new, writable_parquet
 from svo.cli.frame import app, one_line_errors
-from svo.cli.options import AsJson
+from svo.cli.options import AsJson, Overwrite
 from svo.cli.output import print_json
 
 
@@ -26,6 +26,7 @@ def import_(
         Path | None,
         typer.Option(metavar="LOG.parquet", callback=writable_parquet, help="Plain log to write."),
     ] = None,
+    overwrite: Overwrite = False,
     guess: Annotated[
         bool, typer.Option("--guess", help="Read nothing: propose a [log] table for this log, to be checked by you.")
     ] = False,
@@ -56,9 +57,13 @@ def import_(
             "expected --toml my.toml, whose [log] says how the log is written, and --out LOG.parquet; or --guess, "
             "which proposes such a table"
         )
+    from svo.cli.progress import busy
     from svo.plant.imported import import_log
 
-    found = import_log(log, face.find_plant(toml), out)
+    if not (out.exists() and log.exists() and out.samefile(log)):  # which is refused in any case
+        check_new(out, overwrite)
+    with busy("Reading"):
+        found = import_log(log, face.find_plant(toml), out)
     if as_json:
         print_json(found.to_dict())
     else:
