@@ -248,5 +248,5 @@ void carry_basis(const window *w, integer q)
     if (base_then < 0)
         forget_basis(w, q);
     else if (drop_old(w, q, base_then, base - base_then, &p, &c))
-        w->k[q] = factor_basis(w, q, p, c, 1e-6);
+        w->k[q] = factor_basis(w, q, p, c, SAFE_PIVOT);
 }

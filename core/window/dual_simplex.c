@@ -1,20 +1,15 @@
 /* Bounded dual simplex: maximise c'z over -1 <= z <= 1, lower <= G z <= upper.
  *
  * Everything being boxed, any nonsingular basis is dual feasible after flipping bounds: there is no phase 1, and an
- * empty program shows itself with the multipliers that prove it. Whatever the pivots did, the value that leaves is
- * the weak-duality sum of the multipliers, rounded outward, hence an outer bound.
+ * empty program shows itself with the multipliers that prove it. maximise.c makes a bound of what it ends with.
  */
 #include "window.h"
 
-#define FEASIBILITY 1e-9 /* violation of a scaled row or variable that counts as none */
-#define NEAR_WORST 0.5   /* of the worst violation: rows from which on the exact norm is asked */
-#define REFACTOR 60      /* pivots between factorisations */
-#define CLEAN_PIVOT 1e-11
-#define SAFE_PIVOT 1e-6
-#define LONG 150         /* pivots after which a program goes on with a cost that is disturbed by */
-#define LARGE_JITTER 1e8 /* times the jitter, 1e-3 of the largest cost, and each time by */
-#define LESS_JITTER 10.0
-#define GAP 1e-9         /* between bound and optimum, as a share of the largest cost, not worth a factorisation */
+#define FEASIBILITY 1e-9   /* violation of a scaled row or variable that counts as none */
+#define ROUNDED (1e3 * UNIT) /* of the terms of a row: what its sums may have lost, besides */
+#define NEAR_WORST 0.5     /* of the worst violation: rows from which on the exact norm is asked */
+#define REFACTOR 60        /* pivots between factorisations */
+#define STALLED 1000       /* pivots after which the cost must have fallen: by rounding, a program could go on for ever */
 
 /* target = row of the inverse's rows combined: sum over b of factor_b inverse[b, :]. */
 static void combine(const window *w, integer q, integer k, const double *values, double *target)
@@ -60,6 +55,49 @@ WIDE static void primal_point(const window *w, integer q, integer k)
     for (integer a = 0; a < k; a++) w->wk[a] = (w->at_upper[a] ? w->upper : w->lower)[rows[a]] - w->act[rows[a]];
     for (integer b = 0; b < k; b++) w->z[cols[b]] = w->uk[b] = dot(inverse + b * K, w->wk, k);
     add_rows(w->act, w->GT, cols, w->uk, k, w->R);
+}
+
+/* How far the active rows are from their bounds, in units of what counts as nothing; wk = what they miss.
+ *
+ * They are on their bounds but for the errors of the inverse, whose share grows with the basic variables. */
+static double misfit(const window *w, integer q, integer k)
+{
+    const integer *rows = w->rows + q * w->K, *cols = w->cols + q * w->K;
+    double worst = 0.0, size = 1.0;
+    for (integer a = 0; a < k; a++) {
+        const integer i = rows[a];
+        w->wk[a] = (w->at_upper[a] ? w->upper : w->lower)[i] - w->act[i];
+        worst = larger(fabs(w->wk[a]) / (FEASIBILITY + ROUNDED * w->magnitude[i]), worst);
+    }
+    for (integer b = 0; b < k; b++) size = larger(fabs(w->z[cols[b]]), size);
+    return worst / size;
+}
+
+/* One step of iterative refinement: the basic variables move by what the active rows miss, which is in wk. */
+static void refine_point(const window *w, integer q, integer k)
+{
+    const integer K = w->K, *cols = w->cols + q * K;
+    const double *inverse = w->inverse + q * K * K;
+    for (integer b = 0; b < k; b++) w->z[cols[b]] += w->uk[b] = dot(inverse + b * K, w->wk, k);
+    add_rows(w->act, w->GT, cols, w->uk, k, w->R);
+}
+
+/* Prices and point of a basis whose inverse is true: refined, or factored anew with ever larger pivots, where the point
+ * misses the bounds of active rows. What pivots too little leaves the basis; its size. */
+static integer prepare_basis(const window *w, integer q, integer k)
+{
+    static const double thresholds[] = {CLEAN_PIVOT, SAFE_PIVOT, LARGE_PIVOT, INFINITY};
+    price_out(w, q, k);
+    primal_point(w, q, k);
+    for (integer attempt = 0; misfit(w, q, k) > 1.0; attempt++) {
+        refine_point(w, q, k);
+        if (misfit(w, q, k) <= 1.0) break;
+        w->clock[REFACTORED]++;
+        k = factor_basis(w, q, k, k, thresholds[attempt]);
+        price_out(w, q, k);
+        primal_point(w, q, k);
+    }
+    return k;
 }
 
 /* Violations of the rows, zero for active ones, and the largest, which is not negative. */
@@ -199,26 +237,35 @@ static integer pivot(const window *w, integer q, integer k, leaving out, enterin
     return change_basis(w, q, k, out, enter, theta);
 }
 
+/* Whether the cost has fallen since it was looked at; on a way without end it does not. */
+static integer has_fallen(const window *w, double *value)
+{
+    const double before = *value;
+    *value = dot(w->cost, w->z, w->Z);
+    return *value < before;
+}
+
 /* Bounded dual simplex from the basis of direction q; w->cost is maximised. Returns the outcome. */
-static integer optimise(const window *w, integer q, integer limit)
+integer dual_simplex(const window *w, integer q, integer limit)
 {
     const integer without_room = w->clock[CAPPED] ? STOPPED : OVERFULL;
-    integer k = w->k[q], since = 0, pivots = 0, outcome = STOPPED;
-    price_out(w, q, k);
-    primal_point(w, q, k);
+    integer k = prepare_basis(w, q, w->k[q]), since = 0, pivots = 0, outcome = STOPPED;
+    double value = INFINITY;
     for (;;) {
         if (since >= REFACTOR) {
             since = 0;
-            k = factor_basis(w, q, k, k, CLEAN_PIVOT);
-            price_out(w, q, k);
-            primal_point(w, q, k);
+            k = prepare_basis(w, q, factor_basis(w, q, k, k, CLEAN_PIVOT));
         }
         const leaving out = choose_leaving(w, q, k);
         if (out.row < 0 && out.position < 0) {
             outcome = OPTIMAL;
-            break;
+            if (since == 0 || misfit(w, q, k) <= 1.0) break;
+            outcome = STOPPED;
+            since = 0;
+            k = prepare_basis(w, q, k);
+            continue;
         }
-        if (pivots >= limit) break;
+        if (pivots >= limit || (pivots % STALLED == STALLED - 1 && !has_fallen(w, &value))) break;
         if (k + 1 >= w->K) {
             outcome = without_room;
             break;
@@ -241,106 +288,5 @@ static integer optimise(const window *w, integer q, integer limit)
     return outcome;
 }
 
-/* Weak-duality bound of max cost'z for the multipliers of the active rows, rounded up. */
-WIDE static double outer_value(const window *w, integer q)
-{
-    const integer Z = w->Z, k = w->k[q], *rows = w->rows + q * w->K;
-    double *rest = w->alpha, size = 0.0, value = 0.0;
-    copy(rest, w->cost, Z);
-    for (integer j = 0; j < Z; j++) size += fabs(rest[j]);
-    for (integer a = 0; a < k; a++) {
-        const integer i = rows[a];
-        const double m = w->multiplier[a];
-        value += m * (m > 0.0 ? w->upper[i] : w->lower[i]);
-        size += fabs(m) * w->magnitude[i];
-        w->wk[a] = -m;
-    }
-    add_rows(rest, w->G, rows, w->wk, k, Z);
-    for (integer j = 0; j < Z; j++) value += fabs(rest[j]);
-    return value + 2.0 * UNIT * (double)(Z + k + 8) * size;
-}
-
-/* How far the Farkas multipliers are from a proof, in floats: negative proves, up to rounding. */
-static double farkas_gap(const window *w)
-{
-    double *total = w->alpha, value = 0.0, size = 0.0;
-    fill(total, 0.0, w->Z);
-    for (integer i = 0; i < w->R; i++) {
-        const double f = w->farkas[i];
-        if (f == 0.0) continue;
-        value += f * (f > 0.0 ? w->upper[i] : w->lower[i]);
-        size += fabs(f) * w->magnitude[i];
-        add_multiple(total, f, w->G + i * w->Z, w->Z);
-    }
-    for (integer j = 0; j < w->Z; j++) value += fabs(total[j]);
-    return value + UNIT * size;
-}
-
-/* The true cost, disturbed by so many times the jitter. */
-static void disturb_cost(const window *w, double factor)
-{
-    const double scale = factor * largest_magnitude(w->true_cost, w->Z);
-    for (integer j = 0; j < w->Z; j++) w->cost[j] = w->true_cost[j] + scale * w->jitter[j];
-}
-
-/* Whether the multipliers at hand and the last point, which is one of the window, leave nothing to gain. */
-static integer is_close(const window *w, integer q)
-{
-    copy(w->cost, w->true_cost, w->Z);
-    return outer_value(w, q) - dot(w->cost, w->z, w->Z) <= GAP * largest_magnitude(w->cost, w->Z);
-}
-
-/* `optimise`; what takes long goes on with a cost that is disturbed far more, then by less and less.
- *
- * In a long window the cost of most variables is next to nothing, so most steps are short: large disturbances save
- * three pivots of four. Any basis being dual feasible, the way back takes no phase of its own; in one leap it took
- * more pivots than all before it, or had no end. */
-static integer optimise_patiently(const window *w, integer q, integer limit)
-{
-    const integer begun = w->clock[PIVOTS];
-    disturb_cost(w, 1.0);
-    integer outcome = optimise(w, q, least(limit, LONG));
-    if (outcome != STOPPED || limit <= LONG) return outcome;
-    for (double factor = LARGE_JITTER; factor >= 1.0; factor /= LESS_JITTER) {
-        disturb_cost(w, factor);
-        outcome = optimise(w, q, most(limit - (w->clock[PIVOTS] - begun), 0));
-        if (outcome != OPTIMAL || is_close(w, q)) break;
-    }
-    return outcome;
-}
-
-/* What `optimise_patiently` found; an empty program only with multipliers that prove it, up to rounding: else from a
- * basis that is factored anew, then from none. */
-static integer optimise_surely(const window *w, integer q, integer limit)
-{
-    for (integer attempt = 0; attempt < 3; attempt++) {
-        if (attempt == 1) {
-            w->clock[REFACTORED]++;
-            w->k[q] = factor_basis(w, q, w->k[q], w->k[q], SAFE_PIVOT);
-        } else if (attempt == 2) {
-            forget_basis(w, q);
-        }
-        const integer outcome = optimise_patiently(w, q, limit);
-        if (outcome != EMPTY || farkas_gap(w) < 0.0) return outcome;
-    }
-    return STOPPED;
-}
-
-/* Outer bound of max cost'z over the window, from the basis of direction q; returns the outcome. */
-integer maximise(const window *w, integer q, integer limit, double *bound)
-{
-    carry_basis(w, q);
-    copy(w->true_cost, w->cost, w->Z);
-    const integer outcome = optimise_surely(w, q, limit);
-    if (outcome == STOPPED) w->clock[STOPS]++;
-    copy(w->cost, w->true_cost, w->Z);
-    *bound = outer_value(w, q);
-    if (outcome == OPTIMAL && *bound - dot(w->cost, w->z, w->Z) > GAP * largest_magnitude(w->cost, w->Z)) {
-        /* Breakpoints that the ratio test passed over as small, and multipliers that have drifted, cost the bound
-         * something where rows are long and their bounds wide: the same basis, factored and priced anew. */
-        w->clock[REFACTORED]++;
-        w->k[q] = factor_basis(w, q, w->k[q], w->k[q], CLEAN_PIVOT);
-        if (optimise(w, q, least(limit, REFACTOR)) == OPTIMAL) *bound = smaller(outer_value(w, q), *bound);
-    }
-    return outcome;
-}
+/* Multipliers of the basis for the cost. */
+void price_rows(const window *w, integer q) { combine(w, q, w->k[q], w->cost, w->multiplier); }

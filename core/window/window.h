@@ -22,6 +22,9 @@
 #define FLOOR 0x1p-900    /* of an error: in normal form, more than underflow can lose */
 #define LARGEST 0x1p100   /* of a state: a window that reaches beyond says nothing more, and floats would overflow */
 #define ENORMOUS 0x1p1000 /* of an input: beyond all states that observers bound */
+#define CLEAN_PIVOT 1e-11 /* in a factorisation: smaller ones leave the basis; */
+#define SAFE_PIVOT 1e-6   /* these and */
+#define LARGE_PIVOT 1e-3  /* those where it is not accurate */
 #define UPWARD (1.0 + 1e-12) /* more than sums of nonnegative terms round */
 
 enum { AT_LOWER, AT_UPPER, BASIC, AT_CENTRE };     /* status of a variable */
@@ -270,6 +273,10 @@ entering choose_entering(const window *w, integer m, double violation);
 entering avoid_small_pivot(const window *w, integer m, entering chosen);
 
 /* dual_simplex.c */
+integer dual_simplex(const window *w, integer q, integer limit);
+void price_rows(const window *w, integer q);
+
+/* maximise.c */
 integer maximise(const window *w, integer q, integer limit, double *bound);
 
 /* sample.c: a whole sample, whose data lie in in_*; `enter`, `move`, `complete`, CHANNELS where signs are open, and

@@ -19,7 +19,7 @@ from polytopes.native import Address, Integer, Real
 from svo.checks import Array
 
 LARGEST = 2.0**100  # of a state: a window that reaches beyond says nothing any more
-PIVOT_LIMIT = 10_000
+UNLIMITED = 1 << 60  # pivots of a program
 ALL = 1 << 60  # programs: more than any task has
 
 # As in `core/window/window.h`.

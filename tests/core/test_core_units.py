@@ -21,7 +21,7 @@ PIECES = {
     "rounding": ("window/rounding.c",),
     "basis": ("window/basis.c", "window/memory.c"),
     "ratio_test": ("window/ratio_test.c", "window/memory.c"),
-    "dual_simplex": tuple(f"window/{name}.c" for name in ("dual_simplex", "ratio_test", "basis", "memory")),
+    "dual_simplex": tuple(f"window/{name}.c" for name in ("maximise", "dual_simplex", "ratio_test", "basis", "memory")),
     "samples": ("window/*.c",),
     "programs": tuple(f"polytopes/{name}.c" for name in ("programs", "simplex", "basis", "duality")),
     "scaling": ("polytopes/scaling.c",),

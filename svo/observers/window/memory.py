@@ -167,13 +167,13 @@ class Memory:
 
     def take(self, sample: Sample, eps: float) -> tuple[int, int, int]:
         """`kernel.take_sample`, with as much room for bases as it needs."""
-        return self.go_on(kernel.take_sample(self.address, sample[:-1], eps, kernel.PIVOT_LIMIT), eps)
+        return self.go_on(kernel.take_sample(self.address, sample[:-1], eps, kernel.UNLIMITED), eps)
 
     def go_on(self, found: tuple[int, int, int], eps: float) -> tuple[int, int, int]:
         """What the kernel told of a sample, which it goes on with where it has stopped for more room."""
         while found[1] == kernel.FULL:
             self.enlarge(2 * self.size.K)
-            found = kernel.take(self.address, eps, kernel.PIVOT_LIMIT)
+            found = kernel.take(self.address, eps, kernel.UNLIMITED)
         return found
 
     def solve(self, task: int, start: int, stop: int, limit: int) -> tuple[int, int]:

@@ -175,7 +175,7 @@ class SplitPrograms:
     ) -> tuple[int, float, tuple[int, int] | None]:
         self._apply(cell)
         self._memory.arrays["seen_base"][:] = -1  # the bases are those of other rows
-        verdict, _ = self._memory.solve(task, program, program + 1, kernel.PIVOT_LIMIT)
+        verdict, _ = self._memory.solve(task, program, program + 1, kernel.UNLIMITED)
         branch = self._most_violated(cell) if verdict == kernel.CONSISTENT else self._widest(cell)
         return verdict, bound(), branch
 

@@ -141,7 +141,7 @@ class Window:
         """
         memory, eps, self.reason = self.memory, self.settings.eps, None
         memory.check_whole()
-        done, told = kernel.follow(memory.address, samples, eps, kernel.PIVOT_LIMIT, boxes)
+        done, told = kernel.follow(memory.address, samples, eps, kernel.UNLIMITED, boxes)
         return done, memory.go_on(told, eps)
 
     @property
@@ -370,7 +370,7 @@ class Window:
             split = SplitPrograms(memory, self.certificate, self.settings.sign_split)
             if split.is_needed:
                 return self._solve_split(split, task)
-        verdict, program = memory.solve(task, 0, kernel.ALL, kernel.PIVOT_LIMIT)
+        verdict, program = memory.solve(task, 0, kernel.ALL, kernel.UNLIMITED)
         return self._conclude(task, verdict, program)
 
     def _decide(self, end: float | None) -> VerdictName:
@@ -399,22 +399,21 @@ class Window:
             if task == kernel.ARRIVAL and self._prove():
                 return "falsified"
             after = program + 1
-            verdict, program = memory.solve(task, after, kernel.ALL, kernel.PIVOT_LIMIT)
+            verdict, program = memory.solve(task, after, kernel.ALL, kernel.UNLIMITED)
         if verdict == kernel.CONSISTENT:
             return "consistent"
         return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
 
     def _solve_one(self, task: int, program: int, end: float | None) -> int:
         """One program, its pivots in portions until it is decided or the time ``end`` is reached, if there is one."""
-        memory, done, stopped = self.memory, 0, self.stopped
+        memory, stopped = self.memory, self.stopped
         while True:
-            over = end is None or perf_counter() >= end or done >= kernel.PIVOT_LIMIT
-            portion = kernel.PIVOT_LIMIT if end is None else 0 if over else _PIVOTS_BETWEEN_LOOKS
+            over = end is None or perf_counter() >= end
+            portion = kernel.UNLIMITED if end is None else 0 if over else _PIVOTS_BETWEEN_LOOKS
             verdict, _ = memory.solve(task, program, program + 1, portion)
             if over or verdict != kernel.UNDECIDED:
                 memory.arrays["clock"][kernel.STOPS] = min(self.stopped, stopped + (verdict == kernel.UNDECIDED))
                 return int(verdict)
-            done += portion
 
     def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
         """As `solve`, each program over its cells."""

@@ -288,7 +288,7 @@ def test_warm_up_leaves_the_observer_alone(horizon: int | None) -> None:
 def test_the_fallback_decides_what_the_simplex_leaves_open(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a single pivot, HiGHS decides and its rays are proven."""
     model, log = flown(30)
-    monkeypatch.setattr(kernel, "PIVOT_LIMIT", 0)
+    monkeypatch.setattr(kernel, "UNLIMITED", 0)
     observer = WindowObserver(model, BOX)
     assert {verdict for verdict, *_ in run_all(observer, log)} == {"consistent"}
     step = observer.step(log.u[-1], [50.0])

@@ -66,7 +66,7 @@ def test_a_program_that_is_stopped_early_is_wider_and_never_narrower(limit: int)
     for direction in rng.normal(size=(5, observer.model.n_states)):
         w["query"][:] = direction
         answers = []
-        for pivots in (limit, kernel.PIVOT_LIMIT):
+        for pivots in (limit, kernel.UNLIMITED):
             kernel.solve(memory.address, kernel.QUERY, 0, 1, pivots)
             answers.append(float(w["answer"][0]))
         assert answers[1] <= answers[0] + 1e-12 * abs(answers[0])
