@@ -1,8 +1,8 @@
 """The same plant in other forms: states and sensors in another order, things said twice, an uncertainty halved.
 
-The window observer's sets agree to 1e-6 of their width, but for what the compiled simplex does to its cost: it moves it
-by 1e-11, in a way that depends on the order of the variables. Sets that are hardly wider than what this adds up to, as of
-runs at the corners of every bound, agree to `ROOM`.
+The window observer's sets agree to 1e-6 of their width, but for what the compiled simplex does to its cost: it moves
+it by 1e-11, in a way that depends on the order of the variables. Sets that are hardly wider than what this adds up to,
+as of runs at the corners of every bound, agree to `ROOM`.
 """
 
 from __future__ import annotations
