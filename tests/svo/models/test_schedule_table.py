@@ -103,3 +103,13 @@ def test_a_function_of_many_samples_with_a_wrong_shape_is_named() -> None:
 
     with pytest.raises(ValueError, match=r"A has shape \(1, 2\); expected \(2, 2\) at each sample"):
         model(lambda table: Wrong(table) if table is A else Doubled(table)).stack_over(POINTS)
+
+
+def test_a_table_in_other_units_gives_the_same_bits() -> None:
+    rng = np.random.default_rng(12)
+    table = ScheduleTable(np.cumsum(rng.uniform(0.1, 1.0, 9)), rng.normal(size=(9, 3, 2)))
+    unit = np.ldexp(1.0, rng.integers(-30, 30, (3, 2)))
+    at = rng.uniform(-1.0, 10.0, 50)
+    for s in at.tolist():
+        assert (table.times(unit)(s) == table(s) * unit).all()
+    assert (table.times(unit).over(at) == table.over(at) * unit).all()
