@@ -39,3 +39,10 @@ def test_the_citation_file_says_what_the_format_asks_for() -> None:
     version = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)
     assert version is not None
     assert f"version: {version[1]}" in text
+
+
+@pytest.mark.parametrize("page", [*PAGES, *sorted((ROOT / "notebooks").glob("*.ipynb"))], ids=lambda page: page.name)
+def test_examples_say_which_is_the_input_and_which_the_measurement(page: Path) -> None:
+    """`update(y0, u)` but `step(u, y)`: with one of each, a swap would be a silent falsification."""
+    text = page.read_text(encoding="utf-8")
+    assert not re.findall(r"\.(?:step|update)\([^()=\n]+,[^\n]*", text)

@@ -140,13 +140,13 @@ class OnlineFilter:
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Array:
         """The first measurement; returns its whitened innovation (ny,)."""
         if self._at is not None:
-            raise ValueError("update was called after the first sample; use step(u, y)")
+            raise ValueError("update was called after the first sample; use step(u=..., y=...)")
         return self._advance(None, y0, u, schedule)
 
     def step(self, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None = None, schedule: Any = None) -> Array:
         """One transition driven by u, then the measurement y; returns its whitened innovation (ny,)."""
         if self._at is None:
-            raise ValueError("step was called before the first measurement; call update(y0)")
+            raise ValueError("step was called before the first measurement; call update(y0=...)")
         return self._advance(self._at(self._inputs(u)), y, u_next, schedule)
 
     def _inputs(self, u: ArrayLike | None) -> Array:

@@ -150,7 +150,7 @@ class IntervalDetector(Shown):
         """
         begun = perf_counter()
         if self._started:
-            raise ValueError("update was called after the first sample; use step(u, y), or reset to start again")
+            raise ValueError("update was called after the first sample; use step(u=..., y=...), or reset first")
         measured = _number("y", y0, missing=True)
         self._started = True
         return self._judge(measured, schedule, begun)
@@ -185,7 +185,7 @@ class IntervalDetector(Shown):
             if schedule is not None:
                 raise ValueError(
                     "step was called before update with a schedule: the first transition needs that of the first "
-                    "sample; call update(y0, schedule=...) first, with NaN if nothing is measured"
+                    "sample; call update(y0=..., schedule=...) first, with NaN if nothing is measured"
                 )
             self.update(nan)
         self.predictor.step(_number("u", u), self._held, self._schedule)

@@ -10,7 +10,7 @@ from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.checks import Array, bounded_box
 from svo.isolation.bank import Bank, falsified_and_undecided
-from svo.isolation.bank_checks import by_name, check_counts
+from svo.isolation.bank_checks import by_name, check_contain_nominal, check_counts
 from svo.isolation.bank_state import Sample
 from svo.isolation.global_logic import GlobalLogic
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
@@ -23,9 +23,10 @@ Box = tuple[Array, Array]
 class ArchitectureI(Bank):
     """A nominal observer and one observer a fault, all running from the start.
 
-    Every fault model must contain the nominal plant. A fault is detected when the nominal model is
-    falsified, and isolated when exactly one fault model is left. An observer that is declared falsified is
-    no longer stepped.
+    Every fault model must contain the nominal plant. Where the contrary is sure (`svo.isolation.containment`), it is
+    refused; elsewhere it is for the user to know: a fault's model that a healthy log falsifies does not. A fault is
+    detected when the nominal model is falsified, and isolated when exactly one fault model is left. An observer that is
+    declared falsified is no longer stepped.
 
     Parameters
     ----------
@@ -57,7 +58,8 @@ class ArchitectureI(Bank):
     ------
     ValueError
         For a bad or missing name, an observer used twice, observers whose models differ in inputs, outputs
-        or sampling time (in states, if observers can start again), or a count below one.
+        or sampling time (in states, if observers can start again), a fault's model that does not contain the nominal
+        plant, or a count below one.
     """
 
     @options_by_name
@@ -71,7 +73,8 @@ class ArchitectureI(Bank):
         timeout: int | None = None,
     ) -> None:
         check_counts(debounce, recovery, timeout)
-        observers = by_name(nominal, faults, reserved=(NOMINAL,))
+        observers = by_name(nominal, faults, reserved=(NOMINAL, GLOBAL))
+        check_contain_nominal(observers)
         logic = IsolationLogic(tuple(observers), debounce, recovery, timeout)
         super().__init__(logic, observers, same_states=logic.may_restart)
 

@@ -82,7 +82,7 @@ class Bank(Shown, ABC):
             If the bank has already started.
         """
         if self._sample is not None:
-            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
+            raise ValueError("update was called after the first sample; use step(u=..., y=...), or reset(set) first")
         now = Sample.given(None, y0, u, schedule)
         steps = self._ask(lambda name: self._running[name].update(now.y, u=now.u_next, schedule=schedule))
         return self._conclude(0, steps, now)
@@ -122,7 +122,7 @@ class Bank(Shown, ABC):
             `reset` or `load_state_dict`.
         """
         if self._sample is None:
-            raise ValueError("step was called before the first measurement; call update(y0), with NaN if there is none")
+            raise ValueError("step was called before the first measurement; call update(y0=...), NaN if there is none")
         now = Sample.given(u, y, u_next, schedule)
         if deadline is None:
             steps = self._ask(lambda name: self._running[name].step(now.u, now.y, u_next=now.u_next, schedule=schedule))
@@ -152,7 +152,7 @@ class Bank(Shown, ABC):
             refuses, as in `step`.
         """
         if self._sample is None:
-            raise ValueError("late_update was called before the first measurement; call update(y0) first")
+            raise ValueError("late_update was called before the first measurement; call update(y0=...) first")
         taken = self._own_samples(sample, self._sample)
         expect(
             any(own is not None for own in taken.values()), "sample", sample, "one in the window of a running observer"

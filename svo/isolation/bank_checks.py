@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from svo.checks import expect, expect_kind, is_count
+from svo.isolation.containment import excludes
 from svo.isolation.logic import NOMINAL
 from svo.observers.base import Observer
 
@@ -24,6 +25,19 @@ def by_name(nominal: Observer, faults: Mapping[str, Observer], reserved: tuple[s
     for name, observer in observers.items():
         expect_kind(repr(name), observer, Observer, _AN_OBSERVER)
     return observers
+
+
+def check_contain_nominal(observers: Mapping[str, Observer]) -> None:
+    """Refuse fault models that surely do not contain the nominal plant, which Architecture I rests on."""
+    nominal = observers[NOMINAL].model
+    for name, observer in observers.items():
+        alike = observer.model.n_inputs == nominal.n_inputs and observer.model.n_outputs == nominal.n_outputs
+        if name != NOMINAL and alike and excludes(observer.model, nominal):
+            raise ValueError(
+                f"the model of fault {name!r} does not contain the nominal plant: no value of its uncertainties gives "
+                "the nominal response to the inputs; expected bounds that reach from no fault to the largest one, or "
+                "use ArchitectureII with global_=..., whose fault models need not contain it"
+            )
 
 
 def check_counts(debounce: int, recovery: int | None, timeout: int | None) -> None:

@@ -162,7 +162,7 @@ class Observer(Shown, ABC):
         """
         begun = perf_counter()
         if self._number >= 0:
-            raise ValueError("update was called after the first sample; use step(u, y), or reset(set) to start again")
+            raise ValueError("update was called after the first sample; use step(u=..., y=...), or reset(set) first")
         outputs = outputs_of(self.model, y0)
         inputs = inputs_of(self.model, "u", u, self.needs_next_input)
         check_schedule(self.model, schedule)
@@ -313,7 +313,7 @@ class Observer(Shown, ABC):
         """
         self._check_can(self.takes_late, "takes no measurements that come late")
         if self._number < 0:
-            raise ValueError("there is no sample yet; call update(y0), with NaN if there is no measurement")
+            raise ValueError("there is no sample yet; call update(y0=...), with NaN if there is no measurement")
         return self._oldest, self._number
 
     # -- saved states ------------------------------------------------------------------------------------

@@ -52,7 +52,7 @@ def check_may_start_by_step(model: UncertainModel) -> None:
     if model.is_scheduled:
         raise ValueError(
             "step was called before update, and the model has arrays that are functions of the schedule: the first "
-            "transition needs those of the first sample; call update(y0, schedule=...) first, with NaN in y0 if "
+            "transition needs those of the first sample; call update(y0=..., schedule=...) first, with NaN in y0 if "
             "nothing is measured"
         )
 

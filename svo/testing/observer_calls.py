@@ -101,7 +101,7 @@ def arrays_of_the_caller(kind: Kind) -> Iterator[str]:
         yield "answers change when the arrays of one sample are used again for the next, or a box is written into"
 
 
-@rule("run(log) is the answers to its samples", advice="let run call update, then step(u[k-1], y[k], u_next=u[k])")
+@rule("run(log) is the answers to its samples", advice="let run call update, then step(u=u[k-1], y=y[k], u_next=u[k])")
 def a_log_is_its_samples(kind: Kind) -> Iterator[str]:
     for log in (healthy(11), impossible()):
         record = kind.observer().run(log)

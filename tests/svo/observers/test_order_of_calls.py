@@ -26,7 +26,7 @@ SCHEDULED: dict[str, UncertainModel] = {
 def test_a_scheduled_model_starts_with_update(kind: Any, name: str) -> None:
     """x(1) = A(s(0)) x(0): with s(1) in its place a healthy plant is falsified (A = 0.5, then 0.9; x(0) = 1)."""
     observer = kind(SCHEDULED[name], START)
-    with pytest.raises(ValueError, match=r"step was called before update.*call update\(y0, schedule=...\) first"):
+    with pytest.raises(ValueError, match=r"step was called before update.*call update\(y0=..., schedule=...\) first"):
         observer.step(u=[], y=[0.5], schedule=0.9)
     observer.update(y0=[np.nan], schedule=0.5)  # the refused call has changed nothing
     assert observer.step(u=[], y=[0.5], schedule=0.9).verdict == "consistent"
