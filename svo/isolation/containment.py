@@ -7,6 +7,8 @@ the uncertainties of the one do not reach A and C.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from polytopes import HPolytope
@@ -16,13 +18,16 @@ from svo.models import UncertainModel
 _ROUNDING = 1e-9  # of the terms of a response: what a difference must exceed to be one
 
 
-def excludes(fault: UncertainModel, nominal: UncertainModel) -> bool:
+def excludes(fault: Any, nominal: Any) -> bool:
     """Whether a fault's model surely does not contain a nominal one: no Delta at an impulse gives its response.
 
-    False also where nothing is known: models with a schedule, uncertain A or C of the fault, and disturbances of the
-    fault that the nominal model does not have, since these may stand for what inputs within their range do.
+    False also where nothing is known: models that are nonlinear or have a schedule, uncertain A or C of the fault, and
+    disturbances of the fault that the nominal model does not have, since these may stand for what inputs within their
+    range do.
     """
-    if fault.is_scheduled or nominal.is_scheduled or not _same_disturbances(fault, nominal):
+    if not all(isinstance(model, UncertainModel) and not model.is_scheduled for model in (fault, nominal)):
+        return False
+    if not _same_disturbances(fault, nominal):
         return False
     own = fault.stack()
     n = fault.n_states

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes.shown import Shown, counted
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_kind, expect_shape, finite_array, is_count, positive_number, sizes
 from svo.functions.operations import Op
@@ -28,7 +29,7 @@ _WORTH_ANOTHER = 0.1  # of the width of the set: a remainder beyond it is worth 
 
 @options_by_name
 @dataclass(frozen=True, eq=False)
-class NonlinearModel:
+class NonlinearModel(Shown):
     """A plant dx/dt = f(x, u, w, p), y = h(x, u, w, p) + v, |v| <= n, taken by `WindowObserver`.
 
     f and h are traced once. At each sample the observer linearises the plant over the set that it knows, with a bound
@@ -134,6 +135,11 @@ class NonlinearModel:
         put("noise", sizes("n", noise, ny))
 
     # -- sizes -----------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        sizes = {"state": self.n_states, "input": self.n_inputs, "output": self.n_outputs}
+        sizes |= {"disturbance": self.n_disturbances, "parameter": len(self.parameters)}
+        return f"<NonlinearModel of {counted(sizes)}; Ts = {self.Ts:g} s>"
 
     @property
     def n_states(self) -> int:
