@@ -36,7 +36,7 @@ def main() -> None:
     rows = [[op.name.lower(), *(count[what] for what in shown)] for op, count in counts.items()]
     table("Operations beside ball arithmetic", ["operation", *shown], rows)
     outside = sum(count[what] for count in counts.values() for what in OUTSIDE)
-    print(f"{sum(count['points'] for count in counts.values())} points, {outside} outside")
+    print(f"{sum(count['points'] for count in counts.values())} cases, {outside} failures")
     sys.exit(outside > 0)
 
 

@@ -20,7 +20,7 @@ from svo.models.nonlinear.carrier import carrier_of
 from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput, check_output, linear_output
 from svo.models.nonlinear.simulation import simulated
-from svo.models.nonlinear.tracing import Function, Sizes, traced
+from svo.models.nonlinear.tracing import Function, Symbols, traced
 from svo.models.nonlinear.transition import Transition, mapped, transition
 from svo.models.state_range import StateRange, start_range, state_range
 
@@ -37,18 +37,19 @@ class NonlinearModel(Shown):
 
     Parameters
     ----------
-    f, h : functions of vectors
-        Built of ``+ - * / **`` and `svo.functions`; each returns a list of rows. Arguments named u, w and p are inputs,
-        disturbances and parameters; one more, by any name, is the state. They may have those that they need, in any
-        order.
+    f, h : functions of vectors, or mappings from states and outputs to text
+        Functions are built of ``+ - * / **`` and `svo.functions` and return a list of rows. Arguments named u, w and p
+        are inputs, disturbances and parameters; one more, by any name, is the state. They may have those that they
+        need, in any order. Text is an expression of the names below, such as ``"(Q - a * sqrt(h1)) / S"``, which is
+        parsed and never executed.
     states : sequence of str
         Names, one a row of f.
     inputs, disturbances : sequence of str
         Names. Inputs are known, and constant from one sample to the next.
     outputs : sequence of str, optional
         Names, one a row of h.
-    parameters : mapping from names to (lower, upper)
-        Unknown numbers p, free at each sample within their bounds.
+    parameters : mapping from names to (lower, upper), or to a number
+        Unknown numbers p, free at each sample within their bounds; a number is a constant.
     Ts : float
         Sampling time [s].
     n : (ny,) array or float
@@ -86,7 +87,7 @@ class NonlinearModel(Shown):
     inputs: Sequence[str] = ()
     outputs: Sequence[str] | None = None
     disturbances: Sequence[str] = ()
-    parameters: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    parameters: Mapping[str, tuple[float, float] | float] = field(default_factory=dict)
     Ts: float = 1.0
     n: Any = 0.0
     w: Any = None
@@ -114,21 +115,24 @@ class NonlinearModel(Shown):
         twice = next((name for name in all_names if all_names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"the name {twice!r} stands for two things; expected states, inputs and so on to differ")
-        size = Sizes(len(self.states), len(self.disturbances), len(self.parameters), len(self.inputs))
+        symbols, n = Symbols(self.states, self.disturbances, tuple(self.parameters), self.inputs), len(self.states)
+        low, high = (end[len(self.disturbances) :] for end in span)
+        fixed = np.where(low == high, low, np.nan)
         for name in ("physical", "valid"):
-            put(f"{name}_range", state_range(name, getattr(self, name), size.x, bounded=False))
-        largest = start_range(self.physical_range, state_range("largest", self.largest, size.x, bounded=True))
+            put(f"{name}_range", state_range(name, getattr(self, name), n, bounded=False))
+        largest = start_range(self.physical_range, state_range("largest", self.largest, n, bounded=True))
         if largest is None:
             raise ValueError(
                 "largest is missing, and physical is not bounded; expected largest=(lower, upper): where the state is "
                 "when a set has to start again, which every later alarm then rests on"
             )
         put("start_range", largest)
-        tape = traced("f", self.f, size, self.states)
+        tape = traced("f", self.f, symbols, fixed, self.states)
         varies = _varying(self.varying, self.disturbances, list(self.parameters))
         put("flow", Flow(tape, span, varies, tuple(self.states), self.physical_range, self.valid_range))
-        outputs = None if self.outputs is None else _names("outputs", self.outputs)
-        put("reading", traced("h", self.h, size, outputs))
+        written = tuple(self.h) if isinstance(self.h, Mapping) else None
+        outputs = written if self.outputs is None else _names("outputs", self.outputs)
+        put("reading", traced("h", self.h, symbols, fixed, outputs))
         ny = len(self.reading.outputs)
         put("outputs", outputs or tuple(f"y[{i}]" for i in range(ny)))
         noise = np.full(ny, self.n) if np.ndim(self.n) == 0 else self.n
@@ -326,7 +330,8 @@ def _bounds(w: Any, disturbances: Sequence[str], parameters: Any) -> Span:
         upper = sizes("w", w, nw)
         lower = -upper
     expect_kind("parameters", parameters, Mapping, "a mapping from names to (lower, upper)")
-    ends = [finite_array(f"parameters[{name!r}]", ends, (2,)) for name, ends in parameters.items()]
+    given = {name: (ends, ends) if np.ndim(ends) == 0 else ends for name, ends in parameters.items()}
+    ends = [finite_array(f"parameters[{name!r}]", end, (2,)) for name, end in given.items()]
     p = np.array(ends, dtype=float).reshape(-1, 2)
     span = Span(np.concatenate([lower, p[:, 0]]), np.concatenate([upper, p[:, 1]]))
     names = [*disturbances, *parameters]

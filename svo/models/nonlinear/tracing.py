@@ -6,12 +6,25 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any, NamedTuple
 
-from svo.functions.expression import Recorder, rows_of, variables
+import numpy as np
+
+from svo.checks import Array
+from svo.functions.expression import Expression, Recorder, rows_of, variables
 from svo.functions.tape import Tape
+from svo.functions.text import parsed
 
 ORDER = "xwpu"  # of the coordinates of z
-Function = Callable[..., Any]
+Function = Callable[..., Any] | Mapping[str, str]
 _MEANING = {"x": "states", "u": "inputs", "w": "disturbances", "p": "parameters"}
+
+
+class Symbols(NamedTuple):
+    """Names of states, disturbances, parameters and inputs."""
+
+    x: Sequence[str]
+    w: Sequence[str]
+    p: Sequence[str]
+    u: Sequence[str]
 
 
 class Sizes(NamedTuple):
@@ -23,10 +36,20 @@ class Sizes(NamedTuple):
     u: int
 
 
-def traced(what: str, function: Any, sizes: Sizes, names: Sequence[str] | None) -> Tape:
+def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequence[str] | None) -> Tape:
     """The tape of a function whose arguments are named u, w and p, and one by any other name, which is the state.
 
-    ``names`` are those of its rows; None takes as many as it returns.
+    Parameters
+    ----------
+    what : str
+        Its name, for messages.
+    function : callable, or a mapping from the names of its rows to expressions as text
+    symbols : Symbols
+        Names of the coordinates.
+    fixed : (np,) array
+        Values of parameters that are constants, NaN for the others.
+    names : sequence of str, optional
+        Those of the rows; by default as many as it returns.
 
     Raises
     ------
@@ -34,9 +57,14 @@ def traced(what: str, function: Any, sizes: Sizes, names: Sequence[str] | None) 
         If it is no such function, or does what a tape cannot hold; the message names the function and the row.
     """
     recorder, vectors, first = Recorder(), {}, 0
+    sizes = Sizes(*map(len, symbols))
     for letter, size in zip(ORDER, sizes, strict=True):
         vectors[letter] = variables(recorder, first, size)
         first += size
+    for j in np.flatnonzero(~np.isnan(fixed)):
+        vectors["p"][j] = recorder.constant(float(fixed[j]))
+    if isinstance(function, Mapping):
+        return Tape.of(recorder, _written(what, function, recorder, symbols, vectors, names), first)
     arguments = _arguments(what, function, sizes)
     try:
         found = function(**{name: vectors[letter] for name, letter in arguments.items()})
@@ -51,6 +79,31 @@ def traced(what: str, function: Any, sizes: Sizes, names: Sequence[str] | None) 
         found = list(found)
         names = [f"y[{i}]" for i in range(len(found))]
     return Tape.of(recorder, rows_of(what, found, recorder, names), first)
+
+
+def _written(
+    what: str,
+    rows: Mapping[Any, Any],
+    recorder: Recorder,
+    symbols: Symbols,
+    vectors: Mapping[str, Any],
+    names: Sequence[str] | None,
+) -> list[Expression]:
+    """Rows that are written as text, in the order of their names."""
+    names = list(rows) if names is None else names
+    if set(rows) != set(names):
+        missing, more = [n for n in names if n not in rows], [n for n in rows if n not in names]
+        raise ValueError(
+            f"{what} has no row for {', '.join(missing)}"
+            if missing
+            else f"{what} has a row for {more[0]!r:.80}; expected one each for {', '.join(names)}"
+        )
+    known = {
+        name: vector
+        for letter, own in zip(ORDER, symbols, strict=True)
+        for name, vector in zip(own, vectors[letter], strict=True)
+    }
+    return [parsed(f"{what}, row {name}", rows[name], recorder, known) for name in names]
 
 
 def _arguments(what: str, function: Any, sizes: Sizes) -> Mapping[str, str]:

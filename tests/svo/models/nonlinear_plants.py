@@ -15,13 +15,14 @@ from svo.models.nonlinear import NonlinearModel
 
 @dataclass(frozen=True)
 class Case:
-    """A plant, where it starts, and the input at sample k."""
+    """A plant, where it starts, the input at sample k, and what a controller adds to it, if there is one."""
 
     model: NonlinearModel
     x0: Array
     spread: Array
     u: Callable[[int], list[float]]
     smooth: bool = True
+    control: Callable[[Array], Array] | None = None
 
     def inputs(self, samples: int) -> Array:
         return np.array([self.u(k) for k in range(samples)], dtype=float).reshape(samples, self.model.n_inputs)
@@ -38,7 +39,9 @@ def cstr(**changes: Any) -> Case:
         f, lambda x: [x[1]], states=["Ca", "T"], inputs=["Tc"], disturbances=["w1", "w2"], Ts=0.05, n=[0.2],
         w=[0.005, 0.5], physical=([0, 250], [1.1, 600]), largest=([0, 290], [1.05, 480]), **changes,
     )  # fmt: skip
-    return Case(model, np.array([0.5, 350.0]), np.array([0.01, 2.0]), lambda k: [300.0])
+    return Case(
+        model, np.array([0.5, 350.0]), np.array([0.01, 2.0]), lambda k: [300.0], control=lambda y: 4.0 * (350.0 - y)
+    )
 
 
 def tank(**changes: Any) -> Case:
@@ -106,7 +109,7 @@ def servo(**changes: Any) -> Case:
 
     model = NonlinearModel(
         f, lambda x: x, states=["deflection"], inputs=["command"], disturbances=["hinge"], Ts=0.02, n=0.002, w=[0.15],
-        varying="w", physical=([-0.7], [0.7]), **changes,
+        physical=([-0.7], [0.7]), **({"varying": "w"} | changes),
     )  # fmt: skip
     return Case(model, np.array([0.0]), np.array([0.01]), lambda k: [0.3 * np.sign(np.sin(0.05 * k))], smooth=False)
 
@@ -123,12 +126,22 @@ def crane(**changes: Any) -> Case:
     model = NonlinearModel(
         f, lambda x, u: [sin(x[0]) + 0.1 * u[0], x[1]], states=["angle", "rate"], inputs=["force"],
         outputs=["load", "gyro"], disturbances=["wind"], parameters={"gravity": (9.7, 9.9), "drag": (0.1, 0.3)},
-        Ts=0.04, n=[0.01, 0.05], w=[0.1], varying=["wind", "drag"], largest=([-1.5, -8], [1.5, 8]), **changes,
+        Ts=0.04, n=[0.01, 0.05], w=[0.1], largest=([-1.5, -8], [1.5, 8]),
+        **({"varying": ["wind", "drag"]} | changes),
     )  # fmt: skip
     return Case(model, np.array([0.2, 0.0]), np.array([0.1, 0.1]), lambda k: [3.0 * np.sin(0.21 * k)], smooth=False)
 
 
+def friction(**changes: Any) -> Case:
+    """A mass on a rough floor: the sign of its rate jumps, and slides while it sticks."""
+    model = NonlinearModel(
+        lambda x, u, w: [x[1], u[0] - sign(x[1]) - 0.2 * x[1] + w[0]], lambda x: [x[0]], states=["position", "rate"],
+        inputs=["force"], disturbances=["push"], Ts=0.02, n=0.002, w=[0.05], largest=([-50, -20], [50, 20]), **changes,
+    )  # fmt: skip
+    return Case(model, np.array([0.0, 0.3]), np.array([0.01, 0.05]), lambda k: [2.0 * np.sin(0.07 * k)], smooth=False)
+
+
 CASES = {
     "cstr": cstr, "tank": tank, "pendulum": pendulum, "lorenz": lorenz, "three tanks": three_tanks, "servo": servo,
-    "crane": crane,
+    "crane": crane, "friction": friction,
 }  # fmt: skip

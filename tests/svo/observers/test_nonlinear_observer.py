@@ -138,9 +138,33 @@ def test_an_alarm_after_a_new_start_rests_on_largest() -> None:
     assert step.certificate.largest_at == observer.largest_at >= 2
 
 
+def test_equations_as_text_are_those_as_functions() -> None:
+    common = {
+        "states": ["h1", "h2"], "inputs": ["Q"], "disturbances": ["leak"], "w": [0.1], "n": 0.1,
+        "parameters": {"a": (0.9, 1.1), "S": 2.0}, "largest": ([0, 0], [9, 9]),
+    }  # fmt: skip
+    text = NonlinearModel(
+        {"h2": "a * (sqrt(h1) - sqrt(h2)) / S", "h1": "(Q - a * sqrt(h1)) / S + leak"}, {"level": "h2"}, **common
+    )
+    functions = NonlinearModel(
+        lambda x, u, w, p: [(u[0] - p[0] * sqrt(x[0])) / p[1] + w[0], p[0] * (sqrt(x[0]) - sqrt(x[1])) / p[1]],
+        lambda x: [x[1]], outputs=["level"], **common,
+    )  # fmt: skip
+    one, other = (model.transition([1.0, 2.0], [1.5, 2.5], [0.3]) for model in (text, functions))
+    assert text.outputs == functions.outputs == ("level",)
+    assert text.reads == (1,)
+    for name in ("A", "a", "E", "R"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+    assert not one.E[:, 2].any()  # S is a constant
+
+
 @pytest.mark.parametrize(
     ("changes", "error", "why"),
     [
+        ({"f": {"h1": "h2"}}, ValueError, "f has no row for h2"),
+        ({"f": {"h1": "h2", "h2": "h1", "h3": "h1"}}, ValueError, "f has a row for 'h3'; expected one each for h1, h2"),
+        ({"f": {"h1": "h2", "h2": "Q2"}}, ValueError, "f, row h2: unknown symbol 'Q2'.*column 1 of 'Q2'"),
+        ({"h": {"level": "h2 +"}}, ValueError, "h, row level: invalid syntax"),
         ({"f": lambda x, u: [x[0]]}, ValueError, "f returned 1 rows; expected 2, one each for h1, h2"),
         (
             {"f": lambda x, u: [x[0], x[2]]},
