@@ -122,11 +122,8 @@ def watch(
         from svo.detection.watch.view import view_of
         from svo.detection.watch.watch import watch as run_watch
         from svo.plant.description import check_kept_description, keep_description
-        from svo.plant.dialects import dialect_of
 
         the_plant = face.find_plant(plant)
-        if dialect_of(the_plant) is not None:
-            raise ValueError(f"{plant} has a [log] table, and svo watch reads plain logs; use svo detect")
         noise = chosen_noise(the_plant, noise)
         lines = lines_of(log, until_end)
         session = Session(the_plant, noise, lines.name)

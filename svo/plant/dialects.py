@@ -38,18 +38,23 @@ class Widened(Protocol):
 
 
 def on_log(plant: MonitoredPlant, log: Widened) -> MonitoredPlant:
-    """The plant whose bounds hold on a log: with the widening that reading the log cost.
+    """The plant whose bounds hold on a log: with the widening that reading the log cost."""
+    return widened(plant, log.widening)
+
+
+def widened(plant: MonitoredPlant, widening: Array | None) -> MonitoredPlant:
+    """The plant with bounds of its sensors' noise that are wider by ``widening`` (ny,); None is nothing.
 
     Raises
     ------
     TypeError
-        If there is such a widening and the plant cannot take it.
+        If there is something and the plant cannot take it.
     """
-    if log.widening is None:
+    if widening is None:
         return plant
     if not isinstance(plant, StatesDialect):
         raise TypeError(
-            f"readings of the log are less exact than the model of {plant.name} says, by {log.widening.tolist()}, and "
+            f"readings of the log are less exact than the model of {plant.name} says, by {widening.tolist()}, and "
             "the plant has no method widened(widening) that takes that; expected a described plant, or one with it"
         )
-    return plant.widened(log.widening)
+    return plant.widened(widening)

@@ -18,10 +18,12 @@ from svo.detection.watch.lines import Line, Notice
 from svo.detection.watch.rows import RowReader
 from svo.detection.watch.timeline import Event, Row, Timeline
 from svo.isolation import GLOBAL, Alarm, Verdict
+from svo.logs.dialect.live import check_live, live_widening
 from svo.logs.drive import advance
 from svo.models import Labels
 from svo.plant import MonitoredPlant, resume_schedule, saved_schedule, schedule_of
 from svo.plant.description import description_digest
+from svo.plant.dialects import dialect_of, widened
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +104,14 @@ class Session:
     """
 
     def __init__(self, plant: MonitoredPlant, noise: str, source: str) -> None:
+        dialect = dialect_of(plant)
+        if dialect is not None:
+            check_live(dialect)
+            plant = widened(plant, live_widening(dialect, plant.columns))
         self.plant, self.noise, self.source = plant, noise, source
         self.counts = Counts()
         self._notes: list[str] = []
-        self._reader = RowReader(source, plant.columns, self._bad)
+        self._reader = RowReader(source, plant.columns, self._bad, dialect)
         self._timeline = Timeline(plant.Ts, plant.columns.time)
         self._samples = self._undecided = 0
         self._seconds = 0.0

@@ -10,6 +10,7 @@ from typing import Any
 from svo.checks import optional_import
 
 
+@cache
 def conversion(source: str, target: str) -> tuple[float, float]:
     """Factor and offset from one unit to another.
 
