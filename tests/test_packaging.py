@@ -84,7 +84,7 @@ def test_the_wheel_has_every_file_of_the_packages_the_library_and_nothing_else(a
     names = {n for n in zipfile.ZipFile(archives[1]).namelist() if ".dist-info/" not in n}
     sources = {name for name in kept() if name.endswith((".c", ".h"))}
     assert names == kept() - sources | {f"polytopes/{LIBRARY}"}
-    page = {f"svo/studies/pages/{name}" for name in ("report.js", "report.css", "page.html.j2")}
+    page = {f"svo/pages/templates/{name}" for name in ("report.js", "report.css", "page.html.j2", "log.html.j2")}
     assert page | {f"{p}/py.typed" for p in PACKAGES} <= names
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,11 @@ from svo.cli.destinations import writable_file, writable_folder
 from svo.cli.frame import app, chosen_noise, note, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName, Overwrite, positive
 from svo.cli.output import print_json, say
+
+if TYPE_CHECKING:
+    from svo.detection.findings import Findings
+    from svo.detection.found import Detection
+    from svo.detection.report.options import ReportOptions
 
 
 @app.command()
@@ -30,6 +35,19 @@ def detect(
         ),
     ] = None,
     overwrite: Overwrite = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Also write DIR/report.html: verdicts, bounds, readings, proofs.")
+    ] = False,
+    states: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--states", metavar="NAMES", help="States and outputs in the report, with commas between. [default: all]"
+        ),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option("--format", metavar="NAMES", help="Also write the report's pictures as files: svg,pdf,png."),
+    ] = None,
     noise: NoiseName = None,
     architecture: Architecture = None,
     as_json: AsJson = False,
@@ -42,8 +60,9 @@ def detect(
     Example:
       svo detect eclipse log.csv --out findings
       svo detect my.toml log.mat --out findings
+      svo detect my.toml log.csv --out findings --report --format svg,pdf
     """
-    from svo.cli.progress import progress
+    from svo.cli.progress import busy, progress
     from svo.detection.alarm_folder import check_no_results
     from svo.detection.streamed import detect_streamed
     from svo.plant.description import check_kept_description
@@ -51,15 +70,27 @@ def detect(
 
     if out is not None:
         check_no_results(out, overwrite)
+    wanted = _wanted_report(report, out, states, formats)
     the_plant = face.find_plant(plant, architecture=architecture)
     if out is not None and not overwrite:
         check_kept_description(the_plant, out)
     noise = chosen_noise(the_plant, noise)
-    samples = survey_log(log, the_plant)
-    with progress("Samples") as update:
-        found = detect_streamed(the_plant, samples, noise, progress=update)
+    shown: Detection | None = None
+    if wanted is None:
+        samples = survey_log(log, the_plant)
+        with progress("Samples") as update:
+            found: Findings = detect_streamed(the_plant, samples, noise, progress=update)
+    else:  # which shows every sample
+        wanted.check(the_plant, noise)
+        data = face.read_log(log, the_plant)
+        with progress("Samples") as update:
+            found = shown = face.detect(the_plant, data, noise, progress=update)
     if out is not None:
         found.save(out, overwrite=overwrite)
+        if wanted is not None and shown is not None:
+            words = [w for name, w in (("--noise", noise), ("--architecture", architecture)) if w for w in (name, w)]
+            with busy("Bounds and pictures"):
+                wanted.write(out, shown, log, ["svo", "detect", plant, str(log), *words])
     if as_json:
         print_json(found.to_dict())
         return
@@ -67,6 +98,24 @@ def detect(
     if out is not None:
         what = f"Alarms with certificates: {out / 'alarms.jsonl'}; verdict" if found.alarms else "Verdict"
         say(f"{what}: {out / 'verdict.json'}")
+        if report:
+            say(f"Report: {out / 'report.html'}")
+
+
+def _wanted_report(
+    wanted: bool, out: Path | None, states: list[str] | None, formats: list[str] | None
+) -> ReportOptions | None:
+    """What the report is to show; None if there is to be none."""
+    if not wanted:
+        for name, given in (("--states", states), ("--format", formats)):
+            if given:
+                raise ValueError(f"{name} was given without --report, which it is about")
+        return None
+    if out is None:
+        raise ValueError("--report was given without a place for it; expected --out DIR")
+    from svo.detection.report.options import ReportOptions
+
+    return ReportOptions.of(states or (), formats or ())
 
 
 @app.command()

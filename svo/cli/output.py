@@ -60,8 +60,8 @@ def print_json(value: Any) -> None:
 
 def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
     """Tables of a study, one a noise set, and what they count."""
+    from svo.pages.tables import to_rich
     from svo.studies.isolation import tables
-    from svo.studies.tables import to_rich
 
     screen = console()
     for noise in dict.fromkeys(s.noise for s in summaries):
@@ -76,7 +76,7 @@ def print_study(plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
 
 def print_detector_study(found: DetectionStudy) -> None:
     """Tables of a study of interval detectors, and what came out."""
-    from svo.studies.tables import to_rich
+    from svo.pages.tables import to_rich
 
     screen = console()
     for table in found.tables:

@@ -20,6 +20,7 @@ from svo.store import locked, write_text
 
 ALARMS = "alarms.jsonl"
 VERDICT = "verdict.json"
+REPORT, PICTURES = "report.html", "pictures"
 _WATCH = "watch.json"
 _CUT = "alarms.cut"
 _RESULTS = (ALARMS, VERDICT, _WATCH, "study.json", "comparison.csv")
@@ -44,6 +45,16 @@ def check_no_results(folder: Path, overwrite: bool = False) -> None:
             )
             + "give another folder, or move them away first"
         )
+
+
+def remove_report(folder: Path) -> None:
+    """Remove the report of results that are overwritten; pictures of other names stay."""
+    (folder / REPORT).unlink(missing_ok=True)
+    for name in ("verdicts.*", "bounds_*.*", "readings_*.*"):
+        for picture in (folder / PICTURES).glob(name):
+            picture.unlink()
+    with suppress(OSError):  # there is none, or it holds something else
+        (folder / PICTURES).rmdir()
 
 
 def _is_file(path: Path) -> bool:

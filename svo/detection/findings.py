@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from polytopes.shown import Shown, in_a_line
 from polytopes.signatures import options_by_name
-from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results
+from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results, remove_report
 from svo.interval.on_log import ThresholdDetection
 from svo.isolation import Alarm, write_alarms
 from svo.plant import MonitoredPlant
@@ -137,6 +137,8 @@ class Findings(Shown, ABC):
         if not overwrite:
             check_kept_description(self.plant, folder)
         folder.mkdir(parents=True, exist_ok=True)
+        if overwrite:
+            remove_report(folder)
         write_whole(folder / ALARMS, lambda file: write_alarms(file, self.alarms))
         write_text(folder / VERDICT, json_text(self.to_dict(), indent=2) + "\n")
         keep_description(self.plant, folder, overwrite)

@@ -170,7 +170,17 @@ class BankRecord(Shown):
         -------
         list of Artist
         """
-        return self._timeline(channels, self.boxes).draw(ax)
+        return self.timeline(channels).draw(ax)
+
+    def timeline(self, channels: Sequence[str] | None = None) -> Timeline:
+        """What `plot` draws, with ``channels`` as there: to be drawn in parts, or written into files.
+
+        Raises
+        ------
+        ValueError
+            For a channel of another name, and as `boxes`.
+        """
+        return self._timeline(channels, self.boxes)
 
     def to_dataframe(self) -> Any:
         """A `pandas.DataFrame`, a row a sample: time, state of the bank, readings; of each model life and bounds."""

@@ -137,7 +137,9 @@ class Timeline:
                     ink: dict[str, Any] = {"color": "white", "fontsize": 8.0, "ha": "center", "va": "center_baseline"}
                     artists.append(ax.text((left + right) / 2, row, span.text, **ink))
             at = edges[list(lane.falls)]
-            artists += ax.plot(at, np.full(len(at), row), "x", color=INK, markersize=5, markeredgewidth=1.4, zorder=4)
+            artists += ax.plot(
+                at, np.full(len(at), row), "x", color=INK, markersize=5, markeredgewidth=1.4, zorder=4, clip_on=False
+            )
         ax.set(yticks=range(len(self.lanes)), yticklabels=[in_a_line(lane.label, _NAME) for lane in self.lanes])
         for text, lane in zip(ax.get_yticklabels(), self.lanes, strict=True):
             text.set_color(lane.colour)
@@ -162,6 +164,9 @@ class Timeline:
             both = np.concatenate([low, high]) if len(time) < len(self.time) else low
             times = np.concatenate([time, time]) if len(time) < len(self.time) else time
             artists += ax.plot(times, both, ".", color=INK, markersize=2.4)
+            for beyond, edge, mark in ((both > highest, highest, "^"), (both < lowest, lowest, "v")):
+                at, look = times[beyond], {"color": INK, "markersize": 4, "clip_on": False, "zorder": 4}
+                artists += ax.plot(at, np.full(len(at), edge), mark, **look)
         ax.set_ylim(lowest, highest)
         ax.set_title(in_a_line(panel.label, 60) + _legend(panel), pad=3)
         return artists
@@ -171,7 +176,7 @@ class Timeline:
         line: dict[str, Any] = {"color": PALE, "linewidth": 0.9, "linestyle": (0, (4, 3)), "zorder": 3}
         for sample in self.marks:
             artists += [box.axvline(float(self.time[sample]), **line) for box in boxes]
-        if self.marks:
+        if self.marks and self.lanes:
             said = in_a_line(",  ".join(self.marks.values()), 90)
             artists.append(boxes[0].set_title(said, pad=3))
         return artists

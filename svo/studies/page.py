@@ -1,22 +1,17 @@
-"""Pages of studies, from one template: style, script and pictures are inside, and nothing is loaded from elsewhere."""
+"""Pages of studies."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from svo.pages import page
+from svo.pages.tables import TextTable
 from svo.plant import HEALTHY, Plant
-from svo.store import write_text
-from svo.studies.tables import TextTable
 
 
 @dataclass(frozen=True)
@@ -69,9 +64,7 @@ class Report:
 def write_page(
     path: Path, title: str, parts: Iterable[str] = (), script: str = "", report: Report | None = None
 ) -> None:
-    """Write a page with the reports' style inside, and perhaps a script.
-
-    Its policy lets a browser run that script and no other, and load nothing from elsewhere.
+    """Write a page with the reports' style inside, and perhaps a script; see `svo.pages.page.write_page`.
 
     Parameters
     ----------
@@ -82,16 +75,7 @@ def write_page(
     script : str
     report : Report, optional
     """
-    style = own_file("report.css")
-    allowed = "; ".join(f"{what}-src {_hash(text)}" for what, text in (("style", style), ("script", script)) if text)
-    policy = f"default-src 'none'; img-src data:; {allowed}; base-uri 'none'; form-action 'none'"
-    text = render("page.html.j2", title=title, policy=policy, style=style, parts=parts, report=report, script=script)
-    write_text(path, text + "\n")
-
-
-def render(template: str, **values: Any) -> Markup:
-    """A template of the folder ``pages``, filled; every text in ``values`` that is no markup is escaped."""
-    return Markup(_environment().get_template(template).render(values))
+    page.write_page(path, title, "study.html.j2", script, parts=parts, report=report)
 
 
 def study_command(plant: Plant, configuration: Mapping[str, Any]) -> str:
@@ -102,26 +86,3 @@ def study_command(plant: Plant, configuration: Mapping[str, Any]) -> str:
     if list(configuration["faults"]) != [HEALTHY, *plant.faults]:
         options += [f"--fault {name}" for name in configuration["faults"]]
     return f"svo study {configuration['plant']} {' '.join(options)} --out DIR"
-
-
-def own_file(name: str) -> str:
-    """A style or script of the pages."""
-    return files("svo.studies").joinpath("pages", name).read_text(encoding="utf-8")
-
-
-@cache
-def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("svo.studies", "pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["base64"] = lambda path: base64.b64encode(path.read_bytes()).decode("ascii")
-    return environment
-
-
-def _hash(text: str) -> str:
-    """As a content security policy names the text of an element."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -17,7 +17,7 @@ from tests.house.imports import (
 )
 
 ORDER = (
-    "polytopes", "checks", "indices", "terminal", "store", "pictures", "logs", "functions", "models", "faults",
+    "polytopes", "checks", "indices", "terminal", "store", "pictures", "pages", "logs", "functions", "models", "faults",
     "observers", "interval", "residual_tests", "baselines", "isolation", "detectors", "plant", "analysis", "detection",
     "studies", "testing", "cli",
 )  # fmt: skip

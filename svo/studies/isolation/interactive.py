@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from svo.pages.page import render
 from svo.pictures.style import colours
 from svo.plant import HEALTHY, Plant, fault_start
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.plots import separating_states, time_window
 from svo.studies.isolation.run import RunRow
-from svo.studies.page import render
 
 _FRAMES = 160  # samples of a run that the page holds; more would only make it heavier
 _DIGITS = 6

@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from svo.pages.page import own_file
 from svo.plant import Plant
 from svo.studies.added import AddsExhibits
 from svo.studies.configuration import StudyConfiguration
@@ -16,7 +17,7 @@ from svo.studies.isolation.figures import write_pictures
 from svo.studies.isolation.interactive import interactive_section
 from svo.studies.isolation.store import StudyFolder
 from svo.studies.isolation.summary import ConditionSummary, summarise, write_summary
-from svo.studies.page import Picture, Report, own_file, study_command, write_page
+from svo.studies.page import Picture, Report, study_command, write_page
 from svo.studies.runs import finished_runs, publish_beside
 
 _NOTHING = Markup()

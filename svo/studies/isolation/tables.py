@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from svo.pages.tables import TextTable
 from svo.plant import HEALTHY, Plant
 from svo.studies.isolation.summary import ConditionSummary
 from svo.studies.statistics import Delays, Share
-from svo.studies.tables import TextTable
 
 NO_MEAN, NOT_WITHIN_RUN = "–", "∞"
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from svo.pages.tables import TextTable
 from svo.plant import HEALTHY
 from svo.studies.page import Picture, Report, study_command, write_page
 from svo.studies.runs import finished_runs, publish_beside
 from svo.studies.statistics import Share
 from svo.studies.store import StudyStore
-from svo.studies.tables import TextTable
 from svo.studies.thresholds import tables
 from svo.studies.thresholds.figures import write_pictures
 from svo.studies.thresholds.run import LEARNING_RECORDS, LearnsDetectors

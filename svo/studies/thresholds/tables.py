@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from svo.pages.tables import TextTable
 from svo.plant import HEALTHY
 from svo.studies.statistics import Share
-from svo.studies.tables import TextTable
 from svo.studies.thresholds.run import LearnsDetectors
 from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary, learning_records
 

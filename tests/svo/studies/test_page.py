@@ -8,8 +8,8 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from svo.pages.tables import TextTable
 from svo.studies.page import Picture, Report, write_page
-from svo.studies.tables import TextTable
 
 EVIL = "</script><img src=x onerror=\"alert('1')\"> & {{ 7 * 7 }} {% raw %}"
 

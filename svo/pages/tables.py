@@ -1,4 +1,4 @@
-"""Tables of studies as rows of text, for the terminal and for pages alike."""
+"""Tables as rows of text, for the terminal and for pages alike."""
 
 from __future__ import annotations
 

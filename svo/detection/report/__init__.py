@@ -1,0 +1,1 @@
+"""The report on a log: a page, and its pictures as files."""
