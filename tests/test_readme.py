@@ -15,13 +15,14 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_python_blocks_run_and_print_what_they_say(page: Path) -> None:
-    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    form = r"^```python\n(.*?)^```(?:\n\n```text\n(.*?)^```)?"
+    blocks = re.findall(form, page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     assert blocks or page.name != "README.md"
-    for block in blocks:
+    for block, output in blocks:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             exec(compile(block, page.name, "exec"), {})
-        expected = re.findall(r"^print\(.*\)  # (.*)$", block, re.MULTILINE)
+        expected = output.splitlines() or re.findall(r"^print\(.*\)  # (.*)$", block, re.MULTILINE)
         assert printed.getvalue().splitlines() == expected
 
 

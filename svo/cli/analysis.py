@@ -22,6 +22,7 @@ from svo.cli.options import (
     AsJson,
     FaultSize,
     FlightSeed,
+    Formats,
     Limit,
     NoiseName,
     Overwrite,
@@ -151,6 +152,7 @@ def compare(
     retry_failed: RetryFailed = False,
     scheduler: Scheduler = None,
     limit: Limit = None,
+    formats: Formats = "png",
     as_json: AsJson = False,
 ) -> None:
     """Set detectors side by side: the same runs, the same optimiser, the same false-alarm rate, other seeds to judge.
@@ -193,7 +195,7 @@ def compare(
             resume=resume,
             retry_failed=retry_failed,
         )
-    rows = publish_comparison(out, compared, the_plant)
+    rows = publish_comparison(out, compared, the_plant, formats.split(","))
     if as_json:
         print_json([row.to_dict() for row in rows])
     else:

@@ -29,6 +29,15 @@ def positive(value: float | None) -> float | None:
     return value
 
 
+def picture_formats(value: str) -> str:
+    """Formats of pictures, separated by commas."""
+    names = [name.strip().lower() for name in value.split(",") if name.strip()]
+    for name in names:
+        if name not in ("png", "svg", "pdf"):
+            raise typer.BadParameter(f"{name!r} is no format of pictures; expected any of png, svg, pdf: svg,pdf.")
+    return ",".join(names or ["png"])
+
+
 DescribedName = Annotated[
     str, typer.Argument(metavar="PLANT", help="A registered plant, or a TOML file that describes one (my.toml).")
 ]
@@ -39,6 +48,12 @@ PlantName = Annotated[str, typer.Argument(metavar="PLANT", help="A registered pl
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON on standard output.")]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace what this command wrote there before. [default: an error]")
+]
+Formats = Annotated[
+    str,
+    typer.Option(
+        "--format", metavar="LIST", callback=picture_formats, help="Formats of pictures besides PNG: svg,pdf or one."
+    ),
 ]
 CORES = os.cpu_count() or 1
 Workers = Annotated[int, typer.Option(min=1, help="Processes. The results do not depend on it.")]

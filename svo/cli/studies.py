@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,7 @@ from svo.cli.frame import (
 from svo.cli.options import (
     CORES,
     AsJson,
+    Formats,
     Limit,
     NoiseName,
     Overwrite,
@@ -97,6 +99,7 @@ def study(
     ] = False,
     overwrite: Overwrite = False,
     retry_failed: RetryFailed = False,
+    formats: Formats = "png",
     as_json: AsJson = False,
 ) -> None:
     """Measure times to detect and to isolate over many simulated runs.
@@ -141,7 +144,7 @@ def study(
     with progress("Runs") as update:
         folder = run(configuration, out, resume=resume, retry_failed=retry_failed, progress=update, **place)
     with busy("Writing summary, pictures and report"):
-        show(folder, the_plant, {"configuration": configuration.to_dict()} if as_json else None)
+        show(folder, the_plant, formats.split(","), {"configuration": configuration.to_dict()} if as_json else None)
     if not as_json:
         typer.echo(f"Report: {out / 'report.html'}")
     tell_failures(all_failures(folder, the_plant), "runs")
@@ -157,6 +160,7 @@ def report(
     without_damaged: Annotated[
         bool, typer.Option("--without-damaged", help="Leave out parts of the study that are damaged, and name them.")
     ] = False,
+    formats: Formats = "png",
 ) -> None:
     """Write summary.csv, pictures and report.html of a study from the runs that it has so far.
 
@@ -178,9 +182,9 @@ def report(
     study = StudyFolder(folder)
     the_plant = load_plant(study.identity()["configuration"]["plant"])
     if isinstance(the_plant, LearnsDetectors):
-        publish_detectors(study, the_plant, without_damaged)
+        publish_detectors(study, the_plant, without_damaged, formats.split(","))
     else:
-        publish(study, the_plant, without_damaged)
+        publish(study, the_plant, without_damaged, formats.split(","))
     for line in study.notes():
         note(line)
     typer.echo(f"Report: {folder / 'report.html'}")
@@ -243,21 +247,21 @@ def simulate(
     typer.echo(f"{out}: {len(log)} samples of {the_plant.Ts:g} s, {what}, {noise} noise, seed {seed}")
 
 
-def _isolation_study(folder: Any, plant: Any, json: dict[str, Any] | None) -> None:
+def _isolation_study(folder: Any, plant: Any, formats: Sequence[str], json: dict[str, Any] | None) -> None:
     from svo.studies.isolation.publish import publish
     from svo.studies.isolation.summary import to_json
 
-    summaries = publish(folder, plant)
+    summaries = publish(folder, plant, formats=formats)
     if json is None:
         print_study(plant, summaries)
     else:
         print_json({**json, "summary": to_json(summaries)})
 
 
-def _detector_study(folder: Any, plant: Any, json: dict[str, Any] | None) -> None:
+def _detector_study(folder: Any, plant: Any, formats: Sequence[str], json: dict[str, Any] | None) -> None:
     from svo.studies.thresholds import publish
 
-    found = publish(folder, plant)
+    found = publish(folder, plant, formats=formats)
     if json is None:
         print_detector_study(found)
     else:

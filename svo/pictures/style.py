@@ -40,6 +40,13 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def rows_of_axes(figure: Figure, counts: Sequence[int]) -> list[list[Axes]]:
+    """Rows of so many panels, each row as wide as the figure: none is left blank."""
+    grid = figure.add_gridspec(len(counts), 1)
+    rows = [grid[i].subgridspec(1, count) for i, count in enumerate(counts)]
+    return [[figure.add_subplot(row[0, k]) for k in range(count)] for row, count in zip(rows, counts, strict=True)]
+
+
 def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
     """The axes that were given, or those of a new figure of pyplot, of a size [inches], which a notebook shows."""
     if ax is not None:

@@ -6,22 +6,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from svo.plant import Plant, fault_start
-from svo.store import write_whole
 from svo.studies.comparison.comparison import Compared
 from svo.studies.comparison.picture import plot_comparison
 from svo.studies.comparison.table import ComparisonRow, comparison_table, write_runs, write_table
+from svo.studies.drawing import Gallery
 from svo.studies.thresholds.run import LearnsDetectors
 from svo.studies.thresholds.run_figures import write_run_figures
 
 
-def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[ComparisonRow]:
+def publish_comparison(out: Path, compared: Compared, plant: Plant, formats: Sequence[str] = ()) -> list[ComparisonRow]:
     """Write comparison.csv, runs.csv and pictures into a folder; returns the table.
 
     The pictures are comparison.png and, of a plant with interval detectors, runs of these (run_*.png).
     """
-    import matplotlib
-
-    matplotlib.use("agg")
     out.mkdir(parents=True, exist_ok=True)
     rows = comparison_table(compared)
     write_table(out / "comparison.csv", rows)
@@ -29,9 +26,9 @@ def publish_comparison(out: Path, compared: Compared, plant: Plant) -> list[Comp
     scenarios = {(row.fault, row.profile) for row in rows}
     longest = max(_seconds_after(plant, *scenario, compared.comparison.noise) for scenario in scenarios)
     figure = plot_comparison(rows, compared.comparison.rate, plant.Ts, longest)
-    write_whole(out / "comparison.png", lambda file: figure.savefig(file, dpi=130))
+    Gallery(out, formats).save("comparison", figure, "Detectors side by side", "")
     if isinstance(plant, LearnsDetectors):
-        write_run_figures(out, plant, compared.comparison.noise, compared.comparison.seed)
+        write_run_figures(out, plant, compared.comparison.noise, compared.comparison.seed, formats)
     return rows
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from svo.pictures.style import STYLE, colours, in_seconds, new_figure
+from svo.pictures.style import STYLE, colours, in_seconds, new_figure, rows_of_axes
 from svo.plant import HEALTHY, Plant, fault_start
 from svo.store import file_name
-from svo.studies.drawing import save_picture
+from svo.studies.drawing import Gallery
 from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.summary import ConditionSummary
@@ -21,41 +21,45 @@ if TYPE_CHECKING:
 
 
 def write_pictures(
-    folder: Path, plant: Plant, summaries: Sequence[ConditionSummary], exemplars: Sequence[Exemplar]
+    folder: Path,
+    plant: Plant,
+    summaries: Sequence[ConditionSummary],
+    exemplars: Sequence[Exemplar],
+    formats: Sequence[str] = (),
 ) -> list[Picture]:
-    """Write the pictures of a study as PNG files into a folder."""
+    """Write the pictures of a study into a folder, as PNG files and in other ``formats``."""
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
-        return list(_pictures(folder, plant, summaries, exemplars))
+        return list(_pictures(Gallery(folder, formats), plant, summaries, exemplars))
 
 
 def _pictures(
-    folder: Path, plant: Plant, summaries: Sequence[ConditionSummary], exemplars: Sequence[Exemplar]
+    gallery: Gallery, plant: Plant, summaries: Sequence[ConditionSummary], exemplars: Sequence[Exemplar]
 ) -> Iterator[Picture]:
     for noise in dict.fromkeys(s.noise for s in summaries):
         chosen = [s for s in summaries if s.noise == noise and s.fault != HEALTHY]
         if not chosen:
             continue
-        text = "Bars: mean; lines: 5–95 % of the runs; a count where not every run got there."
+        text = "Points: mean; lines: 5–95 % of the runs; a count where not every run got there."
         if plant.reference:
             text += " Diamonds: the paper's figures; triangles point down from its upper bounds."
         title = f"Times to detect and to isolate, {noise} noise"
         banks = architectures(chosen)
         draw = _delays if len(banks) == 1 else _architectures
-        yield save_picture(folder / f"delays_{file_name(noise)}.png", draw(plant, chosen), title, text)
+        yield gallery.save(f"delays_{file_name(noise)}", draw(plant, chosen), title, text)
         for bank in banks:
             shown = [e for e in exemplars if (e.noise, e.architecture) == (noise, bank) and e.fault != HEALTHY]
             several = len(banks) > 1
             where = f"{noise} noise" + (f", Architecture {bank}" if several else "")
-            yield from _of_runs(folder, plant, shown, where, file_name(f"{noise}_{bank}" if several else noise))
+            yield from _of_runs(gallery, plant, shown, where, file_name(f"{noise}_{bank}" if several else noise))
 
 
-def _of_runs(folder: Path, plant: Plant, shown: Sequence[Exemplar], where: str, suffix: str) -> Iterator[Picture]:
+def _of_runs(gallery: Gallery, plant: Plant, shown: Sequence[Exemplar], where: str, suffix: str) -> Iterator[Picture]:
     """The pictures of exemplary runs of one bank with one noise set."""
     title = f"Models alive over time, {where}"
     text = "One run of each fault and profile. A bar ends where the model is falsified, with the delay beside it."
-    yield save_picture(folder / f"alive_{suffix}.png", _alive(plant, shown), title, text)
+    yield gallery.save(f"alive_{suffix}", _alive(plant, shown), title, text)
     slow = _slowest(shown)
     if slow[0].x.shape[1] > 1:
         title = f"Sets of the models and the true state, {where}"
@@ -64,10 +68,10 @@ def _of_runs(folder: Path, plant: Plant, shown: Sequence[Exemplar], where: str, 
             "of each fault, at the last samples before models are falsified. The cross is the true state; a model "
             "is falsified when its set becomes empty."
         )
-        yield save_picture(folder / f"sets_{suffix}.png", _sets(plant, slow), title, text)
+        yield gallery.save(f"sets_{suffix}", _sets(plant, slow), title, text)
     title = f"Bounds and true state, {where}"
     text = "The same runs: what the nominal model (until it is falsified) and the true fault's model allow."
-    yield save_picture(folder / f"bounds_{suffix}.png", _bounds(plant, slow), title, text)
+    yield gallery.save(f"bounds_{suffix}", _bounds(plant, slow), title, text)
 
 
 def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
@@ -77,47 +81,41 @@ def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figur
     for ax, event in zip(axes, ("detect", "isolate"), strict=True):
         plots.plot_architectures(summaries, event, plant.Ts, plant.reference, ax)
         ax.set_ylabel(f"time to {event} [s]")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=len(handles))
+    _delay_legend(figure, plant, summaries)
     return figure
 
 
 def _delays(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
-    from matplotlib.lines import Line2D
-
     figure = new_figure(max(5.5, 1.0 * len(summaries)), 3.9)
     ax = figure.subplots()
     plots.plot_delays(summaries, plant.Ts, plant.reference, ax)
-    handles = ax.get_legend_handles_labels()[0]
-    if any(key in plant.reference for key in ((s.fault, s.profile) for s in summaries)):
-        handles.append(
-            Line2D([], [], marker="D", color=plots.PAPER, linestyle="", markeredgecolor="white", label="paper")
-        )
-        handles.append(
-            Line2D(
-                [], [], marker="v", color=plots.PAPER, linestyle="", markeredgecolor="white", label="paper: below this"
-            )
-        )
-    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    _delay_legend(figure, plant, summaries)
     return figure
+
+
+def _delay_legend(figure: Figure, plant: Plant, summaries: Sequence[ConditionSummary]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = figure.axes[0].get_legend_handles_labels()[0]
+    if any((s.fault, s.profile) in plant.reference for s in summaries):
+        look: Any = {"color": plots.PAPER, "linestyle": "", "markeredgecolor": "white"}
+        handles.append(Line2D([], [], marker="D", label="paper", **look))
+        handles.append(Line2D([], [], marker="v", label="paper: below this", **look))
+    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
 
 
 def _alive(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
     faults = list(dict.fromkeys(e.fault for e in exemplars))
-    columns = max(sum(e.fault == fault for e in exemplars) for fault in faults)
-    figure = new_figure(3.3 * columns + 0.6, 1.75 * len(faults) + 0.3)
-    axes = figure.subplots(len(faults), columns, squeeze=False)
-    for row, fault in zip(axes, faults, strict=True):
-        chosen = [e for e in exemplars if e.fault == fault]
-        for ax, exemplar in zip(row, chosen, strict=False):
+    rows = [[e for e in exemplars if e.fault == fault] for fault in faults]
+    figure = new_figure(3.3 * max(map(len, rows)) + 0.6, 1.75 * len(faults) + 0.3)
+    for chosen, row in zip(rows, rows_of_axes(figure, [len(chosen) for chosen in rows]), strict=True):
+        for exemplar, ax in zip(chosen, row, strict=True):
             plots.plot_alive(exemplar, _start(plant, exemplar), plant.Ts, ax)
             ax.set_title(f"{exemplar.fault}, {exemplar.profile}")
             if ax is not row[0]:
                 ax.set_yticklabels([])
-        for ax in row[len(chosen) :]:
-            ax.set_axis_off()
-    for ax in axes[:-1].ravel():
-        ax.set_xlabel("")
+            if chosen is not rows[-1]:
+                ax.set_xlabel("")
     return figure
 
 
@@ -126,20 +124,17 @@ def _sets(plant: Plant, exemplars: Sequence[Exemplar]) -> Figure:
 
     # The end of a run, with one set left, says nothing where there is something to see before.
     shown = [e.snapshots[:-1] or e.snapshots for e in exemplars]
-    columns = max(len(snapshots) for snapshots in shown)
-    figure = new_figure(3.4 * columns + 0.4, 2.7 * len(exemplars) + 0.4)
-    axes = figure.subplots(len(exemplars), columns, squeeze=False)
-    for row, exemplar, snapshots in zip(axes, exemplars, shown, strict=True):
+    counts = [len(snapshots) for snapshots in shown]
+    figure = new_figure(3.4 * max(counts) + 0.4, 2.7 * len(exemplars) + 0.4)
+    for row, exemplar, snapshots in zip(rows_of_axes(figure, counts), exemplars, shown, strict=True):
         dims = plots.separating_states(exemplar)
-        for ax, snapshot in zip(row, snapshots, strict=False):
+        for ax, snapshot in zip(row, snapshots, strict=True):
             plots.plot_sets(exemplar, snapshot, dims, plant.columns.states, ax)
             after = exemplar.time[snapshot.sample] - _start(plant, exemplar)
             when = in_seconds(after, plant.Ts, "+")
             ax.set_title(f"{exemplar.fault}, {exemplar.profile}: {when}\n{snapshot.event}", fontsize=9.5)
             ax.xaxis.set_major_locator(MaxNLocator(4))
             ax.yaxis.set_major_locator(MaxNLocator(5))
-        for ax in row[len(snapshots) :]:
-            ax.set_axis_off()
     _model_legend(figure, exemplars[0].names)
     return figure
 

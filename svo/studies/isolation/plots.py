@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FILL = 0.14  # opacity of a set, so that those behind it are seen
+_BESIDE = 0.11  # of a condition: the paper's mark stands beside ours
 DETECT, ISOLATE, PAPER = "#56B4E9", "#0072B2", "#D55E00"
 
 
@@ -29,9 +30,9 @@ def plot_delays(
     reference: Mapping[tuple[str, str], Reference] | None = None,
     ax: Axes | None = None,
 ) -> list[Artist]:
-    """Bars of mean times to detect and to isolate with 5-95 % whiskers, on a logarithmic scale.
+    """Mean times to detect and to isolate as points, with 5-95 % whiskers, on a logarithmic scale.
 
-    Where a delay was not reached in every run, the count stands above the bar. ``reference`` figures are drawn as
+    Where a delay was not reached in every run, the count stands above the point. ``reference`` figures are drawn as
     diamonds, or as triangles that point down where the paper gives an upper bound.
     """
     ax = axes_or_new(ax, 6.4, 4.8)
@@ -40,9 +41,9 @@ def plot_delays(
     for offset, name, colour, label in ((-0.19, "detect", DETECT, "detected"), (0.19, "isolate", ISOLATE, "isolated")):
         delays: list[Delays] = [getattr(s, name) for s in faulty]
         at = np.arange(len(faulty)) + offset
-        artists += _bars(ax, at, delays, 0.36, Ts / 2, colour, label)
+        artists += _points(ax, at, delays, Ts / 2, colour, label)
         marks = [(reference or {}).get((s.fault, s.profile)) for s in faulty]
-        artists += _reference_marks(ax, at, [getattr(m, name) if m else "" for m in marks])
+        artists += _reference_marks(ax, at + _BESIDE, [getattr(m, name) if m else "" for m in marks])
     _delay_axes(ax, [f"{s.fault}\n{s.profile}" for s in faulty], Ts / 2)
     return artists
 
@@ -54,7 +55,7 @@ def plot_architectures(
     reference: Mapping[tuple[str, str], Reference] | None = None,
     ax: Axes | None = None,
 ) -> list[Artist]:
-    """Bars of mean times to "detect" or "isolate", the architectures side by side; otherwise as `plot_delays`."""
+    """Mean times to "detect" or "isolate" as points, the architectures side by side; otherwise as `plot_delays`."""
     ax = axes_or_new(ax, 6.4, 4.8)
     faulty = [s for s in summaries if s.fault != HEALTHY]
     conditions = list(dict.fromkeys((s.fault, s.profile) for s in faulty))
@@ -66,7 +67,7 @@ def plot_architectures(
         at = np.array([conditions.index((s.fault, s.profile)) for s in chosen]) + (i - (len(banks) - 1) / 2) * width
         delays = [getattr(s, event) for s in chosen]
         tone = COLOURS[1 + (i + 1) % (len(COLOURS) - 1)]
-        artists += _bars(ax, at, delays, 0.95 * width, Ts / 2, tone, f"Architecture {bank}")
+        artists += _points(ax, at, delays, Ts / 2, tone, f"Architecture {bank}")
     marks = [(reference or {}).get(key) for key in conditions]
     artists += _reference_marks(
         ax, np.arange(len(conditions), dtype=float), [getattr(m, event) if m else "" for m in marks]
@@ -75,13 +76,12 @@ def plot_architectures(
     return artists
 
 
-def _bars(
-    ax: Axes, at: np.ndarray, delays: Sequence[Delays], width: float, floor: float, colour: str, label: str
-) -> list[Artist]:
-    """Bars of means with their whiskers, on a logarithmic axis that begins at ``floor``."""
-    heights = [(d.mean or floor) - floor for d in delays]
-    bars = ax.bar(at, heights, width, bottom=floor, color=colour, label=f"{label}: mean, 5–95 %", zorder=2)
-    return [*bars, *(artist for x, d in zip(at, delays, strict=True) for artist in _whisker(ax, x, d, floor))]
+def _points(ax: Axes, at: np.ndarray, delays: Sequence[Delays], floor: float, colour: str, label: str) -> list[Artist]:
+    """Means with their whiskers, on a logarithmic axis that begins at ``floor``; no point where there is no mean."""
+    means = np.array([np.nan if d.mean is None else d.mean for d in delays])
+    look: dict[str, Any] = {"color": colour, "markersize": 6.5, "markeredgecolor": "white", "zorder": 4}
+    points = ax.plot(at, means, "o", label=f"{label}: mean, 5–95 %", **look)
+    return [*points, *(artist for x, d in zip(at, delays, strict=True) for artist in _whisker(ax, x, d, floor, colour))]
 
 
 def _delay_axes(ax: Axes, labels: Sequence[str], floor: float) -> None:
@@ -194,15 +194,15 @@ def time_window(exemplar: Exemplar, fault_time: float, Ts: float) -> tuple[float
     return max(float(exemplar.time[0]) - fault_time, -0.25 * end), end
 
 
-def _whisker(ax: Axes, x: float, delays: Delays, floor: float) -> list[Artist]:
+def _whisker(ax: Axes, x: float, delays: Delays, floor: float, colour: str) -> list[Artist]:
     artists: list[Artist] = []
     top = delays.mean or floor
     if delays.p05 is not None and delays.p95 is not None:
-        artists += ax.plot([x, x], [delays.p05, delays.p95], color="#1B1F24", linewidth=1.2, zorder=3)
+        artists += ax.plot([x, x], [delays.p05, delays.p95], color=colour, linewidth=1.8, zorder=3)
         top = max(top, delays.p95)
     if delays.reached.count < delays.reached.of:
         text = f"{delays.reached.count}/{delays.reached.of}"
-        artists.append(ax.annotate(text, (x, top), (0, 3), textcoords="offset points", ha="center", fontsize="small"))
+        artists.append(ax.annotate(text, (x, top), (0, 5), textcoords="offset points", ha="center", fontsize="small"))
     return artists
 
 

@@ -42,7 +42,9 @@ _GLOSSARY = {
 }
 
 
-def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) -> list[ConditionSummary]:
+def publish(
+    folder: StudyFolder, plant: Plant, without_damaged: bool = False, formats: Sequence[str] = ()
+) -> list[ConditionSummary]:
     """Write summary.csv, the pictures and report.html into the study's folder; returns the summaries.
 
     Raises
@@ -54,7 +56,8 @@ def publish(folder: StudyFolder, plant: Plant, without_damaged: bool = False) ->
     rows, exemplars = finished_runs(every), folder.exemplars(without_damaged)
     summaries = summarise(rows)
     write_summary(folder.path / "summary.csv", summaries)
-    pictures, failed = write_pictures(folder.path, plant, summaries, exemplars), publish_beside(folder, plant, every)
+    pictures = write_pictures(folder.path, plant, summaries, exemplars, formats)
+    failed = publish_beside(folder, plant, every)
     if isinstance(plant, AddsExhibits):
         asked = StudyConfiguration.from_dict(folder.identity()["configuration"])
         shown = plant.exhibits(folder.path, asked.runs, asked.seed, asked.noise)

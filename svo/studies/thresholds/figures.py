@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from svo.pictures.style import STYLE, new_figure
+from svo.pictures.style import STYLE, new_figure, rows_of_axes
 from svo.plant import HEALTHY
 from svo.store import file_name
-from svo.studies.drawing import save_picture
+from svo.studies.drawing import Gallery
 from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 from svo.studies.thresholds.summary import AssumptionSummary, DetectorSummary, learning_records
@@ -29,16 +29,20 @@ def write_pictures(
     summaries: Sequence[DetectorSummary],
     assumption: Sequence[AssumptionSummary],
     windows: int,
+    formats: Sequence[str] = (),
 ) -> list[Picture]:
-    """Write the pictures of a study as PNG files into a folder; ``windows`` is the longest window length q."""
+    """Write the pictures of a study into a folder, as PNG files and in other ``formats``.
+
+    ``windows`` is the longest window length q.
+    """
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
-        return list(_pictures(folder, plant, summaries, assumption, windows))
+        return list(_pictures(Gallery(folder, formats), plant, summaries, assumption, windows))
 
 
 def _pictures(
-    folder: Path,
+    gallery: Gallery,
     plant: LearnsDetectors,
     summaries: Sequence[DetectorSummary],
     assumption: Sequence[AssumptionSummary],
@@ -51,27 +55,24 @@ def _pictures(
                 "Points: median; lines: 5–95 % of the runs, none where it is infinite. Diamonds: the paper's Table 1."
             )
             figure = _times(plant, chosen)
-            path = folder / f"detection_times_{file_name(noise)}.png"
-            yield save_picture(path, figure, f"Detection times, {noise} noise", text)
+            name = f"detection_times_{file_name(noise)}"
+            yield gallery.save(name, figure, f"Detection times, {noise} noise", text)
         checked = [s for s in assumption if s.noise == noise]
         if checked:
             text = "Share of fault-free runs whose moving average over q samples exceeds the learnt bound."
             title = f"Where assumption (7) fails, {noise} noise"
-            path = folder / f"assumption_{file_name(noise)}.png"
-            yield save_picture(path, _assumption(checked, windows), title, text)
+            name = f"assumption_{file_name(noise)}"
+            yield gallery.save(name, _assumption(checked, windows), title, text)
 
 
 def _times(plant: LearnsDetectors, summaries: Sequence[DetectorSummary]) -> Figure:
     scenarios = list(dict.fromkeys((s.fault, s.profile) for s in summaries))
-    columns = min(3, len(scenarios))
-    rows = -(-len(scenarios) // columns)
-    figure = new_figure(3.5 * columns, 2.5 * rows + 0.3)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for ax, (fault, profile) in zip(axes, scenarios, strict=False):
+    rows = np.array_split(np.arange(len(scenarios)), -(-len(scenarios) // 3))
+    figure = new_figure(3.5 * len(rows[0]), 2.5 * len(rows) + 0.3)
+    axes = [ax for row in rows_of_axes(figure, [len(row) for row in rows]) for ax in row]
+    for ax, (fault, profile) in zip(axes, scenarios, strict=True):
         plot_times(ax, [s for s in summaries if (s.fault, s.profile) == (fault, profile)])
         ax.set_title(plant.label(fault, profile))
-    for ax in axes[len(scenarios) :]:
-        ax.set_axis_off()
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

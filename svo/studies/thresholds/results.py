@@ -64,14 +64,16 @@ class DetectionStudy:
         }
 
 
-def publish(folder: StudyStore[Any], plant: LearnsDetectors, without_damaged: bool = False) -> DetectionStudy:
+def publish(
+    folder: StudyStore[Any], plant: LearnsDetectors, without_damaged: bool = False, formats: Sequence[str] = ()
+) -> DetectionStudy:
     """Write summary.csv, the pictures and report.html into the study's folder; errors as `StudyStore.rows`."""
     every = read_rows(folder, without_damaged)
     rows = finished_runs(every)
     summaries, assumption = summarise(plant, rows), summarise_assumption(rows)
     write_summary(folder.path / "summary.csv", summaries)
     windows = max((q for s in assumption for q in s.by_window), default=1)
-    pictures = write_pictures(folder.path, plant, summaries, assumption, windows)
+    pictures = write_pictures(folder.path, plant, summaries, assumption, windows, formats)
     groups = [
         [s for s in summaries if (s.noise, s.records) == key]
         for key in dict.fromkeys((s.noise, s.records) for s in summaries)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from svo.indices import judge_alarm
 from svo.interval.detector import IntervalRecord
 from svo.pictures.style import STYLE, in_seconds, new_figure
 from svo.plant import HEALTHY, fault_start, first_faulty_sample
-from svo.studies.drawing import save_picture
+from svo.studies.drawing import Gallery
 from svo.studies.page import Picture
 from svo.studies.thresholds.run import LearnsDetectors
 
@@ -22,15 +23,18 @@ _MEASURED, _BOUNDS, _COMMAND = "#4C9A5B", "#C0392B", "#2B6CA3"
 _HALF_SECONDS = 1.0  # half of a zoom's width in the fault-free run
 
 
-def write_run_figures(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> list[Picture]:
+def write_run_figures(
+    folder: Path, plant: LearnsDetectors, noise: str, seed: int, formats: Sequence[str] = ()
+) -> list[Picture]:
     """Figures 3, 4 and 5 of the paper redrawn from our runs: fault-free, its zooms, and the paper's scenarios."""
     import matplotlib as mpl
 
+    gallery = Gallery(folder, formats)
     with mpl.rc_context(STYLE):
         healthy = _record(plant, HEALTHY, HEALTHY, noise, seed)
-        pictures = [_figure_3(folder, healthy), _figure_4(folder, healthy)]
+        pictures = [_figure_3(gallery, healthy), _figure_4(gallery, healthy)]
         if plant.detection_reference:
-            pictures.append(_figure_5(folder, plant, noise, seed))
+            pictures.append(_figure_5(gallery, plant, noise, seed))
     return pictures
 
 
@@ -57,7 +61,7 @@ def _record(plant: LearnsDetectors, fault: str, profile: str, noise: str, seed: 
     return detectors[max(0, len(detectors) - 2)].run(log)
 
 
-def _figure_3(folder: Path, record: IntervalRecord) -> Picture:
+def _figure_3(gallery: Gallery, record: IntervalRecord) -> Picture:
     figure = new_figure(7.5, 4.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     plot_run(top, record)
@@ -66,10 +70,10 @@ def _figure_3(folder: Path, record: IntervalRecord) -> Picture:
     bottom.plot(record.prediction.time, 1e3 * record.prediction.radius, color=_BOUNDS, lw=0.9)
     bottom.set(xlabel="time [s]", ylabel="radius [mrad]")
     text = "As Figure 3 of the paper: the radius grows while the surface moves, and vanishes at rest."
-    return save_picture(folder / "run_healthy.png", figure, "Fault-free run", text)
+    return gallery.save("run_healthy", figure, "Fault-free run", text)
 
 
-def _figure_4(folder: Path, record: IntervalRecord) -> Picture:
+def _figure_4(gallery: Gallery, record: IntervalRecord) -> Picture:
     p = record.prediction
     figure = new_figure(7.5, 3.0)
     settled = p.time > p.time[0] + 4 * _HALF_SECONDS
@@ -84,10 +88,10 @@ def _figure_4(folder: Path, record: IntervalRecord) -> Picture:
         ax.set(title=title, ylabel="position [rad]")
     figure.axes[0].legend()
     text = "As Figure 4: the same run where the radius is largest, and where it is smallest."
-    return save_picture(folder / "run_zoom.png", figure, "Zoom of the fault-free run", text)
+    return gallery.save("run_zoom", figure, "Zoom of the fault-free run", text)
 
 
-def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Picture:
+def _figure_5(gallery: Gallery, plant: LearnsDetectors, noise: str, seed: int) -> Picture:
     scenarios = list(plant.detection_reference)
     figure = new_figure(8.5, 2.5 * len(scenarios))
     for (fault, profile), (wide, near) in zip(
@@ -111,4 +115,4 @@ def _figure_5(folder: Path, plant: LearnsDetectors, noise: str, seed: int) -> Pi
     handles, labels = figure.axes[1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     text = "As Figure 5: the whole run, and the time from fault to alarm (pole of the last filter but one)."
-    return save_picture(folder / "run_faults.png", figure, "Runs with faults", text)
+    return gallery.save("run_faults", figure, "Runs with faults", text)

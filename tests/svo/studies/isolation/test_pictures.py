@@ -12,7 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from polytopes import HPolytope
-from svo.pictures.style import in_seconds
+from svo.pictures.style import in_seconds, rows_of_axes
 from svo.plant import Column, Plant, load_plant
 from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar, Snapshot
@@ -66,17 +66,41 @@ def axes() -> Any:
     return Figure().subplots()
 
 
-def test_bars_show_means_counts_and_the_papers_figures(tank: Plant, summaries: list[ConditionSummary]) -> None:
+def test_points_show_means_counts_and_the_papers_figures(tank: Plant, summaries: list[ConditionSummary]) -> None:
     ax = axes()
     artists = plots.plot_delays(summaries, tank.Ts, tank.reference, ax)
-    tops = [patch.get_y() + patch.get_height() for patch in ax.patches]
-    assert tops[:3] == pytest.approx([0.175, 0.175, 0.16])
-    assert tops[3:] == pytest.approx([0.4, 0.05, 0.2])  # never isolated: no bar, and "0/4" says why
+    detect, isolate = (line.get_ydata() for line in ax.lines if line.get_marker() == "o")
+    assert detect == pytest.approx([0.175, 0.175, 0.16])
+    assert isolate == pytest.approx([0.4, np.nan, 0.2], nan_ok=True)  # never isolated: no point, and "0/4" says why
+    assert not ax.patches  # a bar on a logarithmic axis would begin anywhere
     assert {text.get_text() for text in ax.texts} == {"0/4", "4/5"}
     marks = {line.get_marker(): line.get_ydata()[0] for line in ax.lines if line.get_marker() in "Dv"}
     assert marks["v"] == 0.5
     assert ax.get_yscale() == "log"
-    assert set(ax.patches) <= set(artists)
+    assert set(ax.lines) <= set(artists)
+
+
+def test_pictures_are_written_in_the_formats_asked_for(
+    tank: Plant, summaries: list[ConditionSummary], tmp_path: Path
+) -> None:
+    runs = [exemplar(n=1), exemplar("leak", "ramp", n=1), exemplar("gauge", n=1)]
+    pictures = write_pictures(tmp_path, tank, summaries, runs, ("svg", "pdf"))
+    stems = {picture.path.stem for picture in pictures}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"{s}.{kind}" for s in stems for kind in ("png", "svg", "pdf")
+    }
+    assert all(picture.path.suffix == ".png" for picture in pictures)  # which the page shows
+    begins = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+    assert all(path.read_bytes().startswith(begins[path.suffix[1:]]) for path in tmp_path.iterdir())
+    with pytest.raises(ValueError, match="format is 'gif'; expected one of png, svg, pdf"):
+        write_pictures(tmp_path, tank, summaries, runs, ("gif",))
+
+
+def test_no_panel_is_blank() -> None:
+    figure = Figure()
+    rows = rows_of_axes(figure, [3, 1, 2])
+    assert [len(row) for row in rows] == [3, 1, 2]
+    assert len(figure.axes) == 6
 
 
 def test_a_bar_of_life_ends_with_the_delay(tank: Plant) -> None:
