@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from svo.checks import Array
-from svo.isolation import Alarm, BankRecord, Outcome
+from svo.isolation import NONLINEAR, Alarm, BankRecord, Outcome
 from svo.logs.log import Log
 from svo.models import model_digest
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Certificate, Observer
 from svo.plant import MonitoredPlant, architecture_of
 
@@ -48,6 +49,7 @@ def digest_of_alarm(observer: Observer, certificate: Certificate) -> str:
 
 
 def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:
-    """Which bank an alarm comes from, as stored with it: the plant and, if it offers a choice, the architecture."""
+    """Which bank an alarm comes from, as stored with it: plant, architecture if there is a choice, kind of model."""
     architecture = architecture_of(plant)
-    return {"plant": plant.name} | ({} if architecture is None else {"architecture": architecture})
+    found = {"plant": plant.name} | ({} if architecture is None else {"architecture": architecture})
+    return found | ({"model": NONLINEAR} if isinstance(getattr(plant, "model", None), NonlinearModel) else {})

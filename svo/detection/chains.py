@@ -12,6 +12,8 @@ from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models import ModelSample
+from svo.models.nonlinear import NonlinearModel
+from svo.observers.base import Observer
 from svo.observers.window.chain import promises_of, prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
 from svo.plant import MonitoredPlant, in_architecture
@@ -49,6 +51,16 @@ class PlantModels:
         observer = self.bank(alarm).observers.get(alarm.observer)
         if observer is None:
             return f"the plant's bank has no model {alarm.observer!r:.80}"
+        if not isinstance(observer.model, NonlinearModel):
+            different = self._matrices(alarm, observer)
+            if different is not None:
+                return different
+        if alarm.model is not None and alarm.model != digest_of_alarm(observer, alarm.certificate):
+            return f"the digest is not that of the plant's observer {alarm.observer!r}: it has other options or bounds"
+        return None
+
+    def _matrices(self, alarm: Alarm, observer: Observer) -> str | None:
+        """How an alarm's matrices differ; where they do not, only sizes, sampling time and options can."""
         claimed = alarm.certificate.model_data()
         first = alarm.sample + 1 - len(claimed)
         right = [ModelSample.of(observer.model, self.log.schedule_at(first + i)) for i in range(len(claimed))]
@@ -56,9 +68,6 @@ class PlantModels:
             what = mine.difference(its)
             if what is not None:
                 return f"the {what} of sample {k} differs from that of the plant's model {alarm.observer!r}"
-        # The certificate's numbers are the plant's by now, so only sizes, sampling time and options can differ.
-        if alarm.model is not None and alarm.model != digest_of_alarm(observer, alarm.certificate):
-            return f"the digest is not that of the plant's observer {alarm.observer!r}: it has other options or bounds"
         return None
 
 
@@ -102,6 +111,8 @@ def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
         if not isinstance(observer, WindowObserver):
             kind = "none of that name" if observer is None else f"a {type(observer).__name__}"
             return False, f"only bounds of window observers can be proven; the plant's bank has {kind} for {name!r}"
+        if isinstance(observer.model, NonlinearModel):
+            return False, "bounds of a nonlinear model are not proven from the first sample on; verify without --full"
         replaced[name], splits[name] = proving(observer), observer.sign_split
     bank.exchange(replaced)
     started, fell = _replay(bank, alarm.observer, log)

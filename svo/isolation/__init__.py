@@ -1,6 +1,15 @@
 """Isolation banks: observers of several models beside one another, what they conclude, and alarms with their proofs."""
 
-from svo.isolation.alarms import Alarm, AlarmCheck, check_alarm, read_alarms, verify_alarms, write_alarms
+from svo.isolation.alarms import (
+    NONLINEAR,
+    NOT_CHECKED,
+    Alarm,
+    AlarmCheck,
+    check_alarm,
+    read_alarms,
+    verify_alarms,
+    write_alarms,
+)
 from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
 from svo.isolation.logic import GLOBAL, NOMINAL
@@ -10,6 +19,8 @@ from svo.isolation.recorder import Change, Outcome, Recorder
 __all__ = [
     "GLOBAL",
     "NOMINAL",
+    "NONLINEAR",
+    "NOT_CHECKED",
     "Alarm",
     "AlarmCheck",
     "ArchitectureI",

@@ -74,6 +74,10 @@ class AlarmCheck(Shown):
     seconds: float
 
 
+NONLINEAR = "nonlinear"
+"""Of the source of an alarm: its matrices are those of linearisations."""
+NOT_CHECKED = "that the matrices enclose the nonlinear plant was proven when they were made and is not checked again"
+
 ModelDifference = Callable[[Alarm], str | None]
 
 
@@ -167,6 +171,8 @@ def check_alarm(alarm: Alarm, log: Log | None = None, model_difference: ModelDif
         if model_difference is not None:
             wrong = wrong or model_difference(alarm)
             compared += ", model as the plant's" if alarm.model else ", model not compared beyond matrices and bounds"
+    if alarm.source.get("model") == NONLINEAR:
+        compared += f"; {NOT_CHECKED}"
     reason = wrong or f"proven given {alarm.certificate.premise(alarm.sample)}{compared}"
     return AlarmCheck(0, alarm.observer, alarm.sample, wrong is None, reason, perf_counter() - begun)
 

@@ -19,6 +19,7 @@ import numpy as np
 from polytopes.shown import Shown
 from svo.checks import Array
 from svo.models.model import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 from svo.store.values import encode_value
 
 Options = Mapping[str, Any]
@@ -55,12 +56,12 @@ class ModelSample(Shown):
         return next((what for what, mine, its in pairs if not np.array_equal(mine, its)), None)
 
 
-def model_digest(model: UncertainModel, options: Options, samples: Iterable[ModelSample]) -> str:
+def model_digest(model: UncertainModel | NonlinearModel, options: Options, samples: Iterable[ModelSample]) -> str:
     """SHA-256 of a model, of an observer's options, and of the model's numbers at some samples.
 
     Parameters
     ----------
-    model : UncertainModel
+    model : UncertainModel or NonlinearModel
     options : mapping
         Of text, numbers and arrays: whatever else decides what an observer of the model answers.
     samples : iterable of ModelSample
@@ -69,16 +70,29 @@ def model_digest(model: UncertainModel, options: Options, samples: Iterable[Mode
     content: dict[str, Any] = {
         "sizes": [model.n_states, model.n_inputs, model.n_outputs, model.n_disturbances],
         "Ts": model.Ts,
-        "delta": [u.bounds for u in model.uncertainties],
-        "w": model.disturbance_polytope,
+        "delta": [u.bounds for u in model.uncertainties] if isinstance(model, UncertainModel) else [],
+        "w": model.disturbance_polytope if isinstance(model, UncertainModel) else None,
         "options": dict(options),
         "samples": [{"stack": s.stack, "noise": s.noise, "w": s.w} for s in samples],
     }
     for name, promise in (("physical", model.physical_range), ("largest", model.start_range)):
         if promise is not None:
             content[name] = [promise.lower, promise.upper]
+    if isinstance(model, NonlinearModel):
+        content |= _equations(model)
     text = json.dumps(canonical(content), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _equations(model: NonlinearModel) -> dict[str, Any]:
+    """What a nonlinear model is besides: its tapes, and the bounds of what they are of."""
+    tapes = {
+        name: [t.op, t.operands, t.constants, t.outputs] for name, t in (("f", model.flow.tape), ("h", model.reading))
+    }
+    valid = model.valid_range
+    rest = {"continuous": model.continuous, "bounds": list(model.flow.w), "noise": model.noise}
+    moving = {"varying": model.flow.varying.tolist(), "valid": None if valid is None else [valid.lower, valid.upper]}
+    return tapes | rest | moving
 
 
 def canonical(value: Any) -> Any:

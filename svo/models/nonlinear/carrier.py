@@ -42,13 +42,16 @@ class Linearisation(NamedTuple):
         return self._replace(A=found.A, a=found.a, E=np.hstack([found.E, np.diag(found.R)]))
 
 
-def carrier_of(flow: Flow, noise: Array, Ts: float, physical: Any, largest: Any) -> UncertainModel:
-    """A linear model scheduled by the `Linearisation` of each sample; its typical one has no zeros."""
+def carrier_of(flow: Flow, nu: int, noise: Array, Ts: float, physical: Any, largest: Any) -> UncertainModel:
+    """A linear model scheduled by the `Linearisation` of each sample; its typical one has no zeros.
+
+    Its B is zero: what the inputs do is in a, and a certificate keeps them only to be compared with a log.
+    """
     n, nw, ny = flow.n, len(flow.varying), len(noise)
     typical = Linearisation(np.ones((n, n)), np.ones(n), np.ones((n, nw + n)), np.ones((ny, n)), np.ones(ny), noise)
     unit = np.ones(n)
     return UncertainModel(
-        lambda at: at.A, None, lambda at: at.C, a=lambda at: at.a, E=lambda at: at.E, c=lambda at: at.c,
+        lambda at: at.A, np.zeros((n, nu)), lambda at: at.C, a=lambda at: at.a, E=lambda at: at.E, c=lambda at: at.c,
         n=lambda at: at.n, w=(np.concatenate([flow.w.lower, -unit]), np.concatenate([flow.w.upper, unit])), Ts=Ts,
         physical=physical, largest=largest, schedule=typical,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -191,7 +191,11 @@ class NonlinearModel(Shown):
 
         Its disturbances are w, p, and one a state between -1 and 1, whose column is the remainder.
         """
-        return carrier_of(self.flow, self.noise, self.Ts, self.physical, self.largest)
+        return carrier_of(self.flow, self.n_inputs, self.noise, self.Ts, self.physical, self.largest)
+
+    def replace(self, **changes: Any) -> NonlinearModel:
+        """A copy with ``changes`` of arguments by name, checked again."""
+        return replace(self, **changes)
 
     # -- over a set ------------------------------------------------------------------------------
 

@@ -341,7 +341,6 @@ class WindowObserver(Observer):
         form = self._form
         if self._plant is not None:
             schedule, y = self._plant.measured(y, u_next, self._number)
-            u = u_next = np.zeros(0)  # they are in the linearisations
         stack, (w_lower, w_upper, noise) = self._normal.stack(schedule), self._normal.bounds(schedule)
         u_next = form.inputs(u_next) if self._wants_next_input else u_next  # else zeros
         return Sample(form.inputs(u), u_next, form.outputs(y), stack, noise, w_lower, w_upper, y)

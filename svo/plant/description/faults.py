@@ -10,6 +10,7 @@ from polytopes.shown import Shown
 from svo.faults import ActuatorFault, PlantFault, SensorFault, Step
 from svo.isolation import GLOBAL, NOMINAL
 from svo.models import UncertainModel, Uncertainty
+from svo.models.nonlinear import NonlinearModel
 from svo.plant.description.model import ARRAYS, arrays_of, remainder_of
 from svo.plant.description.table import Table
 
@@ -25,17 +26,21 @@ _KNOWN = {
 class FaultModel(Shown):
     """An observer's model of a fault, and whether the healthy plant is one of the plants that it describes."""
 
-    model: UncertainModel
+    model: UncertainModel | NonlinearModel
     contains_nominal: bool
 
 
 def faults_of(top: Table, nominal: UncertainModel, names: Mapping[str, Sequence[str]]) -> dict[str, FaultModel]:
     """The models of all faults, by name."""
     every = top.table("faults")
-    for name in (NOMINAL, GLOBAL):
-        if name in every:
-            raise every.error(name, "is the name of an observer that every bank has; give the fault another name")
-    return {name: _fault_model(every.table(name), nominal, names) for name in every.content}
+    return {name: _fault_model(check_name(every, name), nominal, names) for name in every.content}
+
+
+def check_name(every: Table, name: str) -> Table:
+    """The table of a fault, unless its name is taken."""
+    if name in (NOMINAL, GLOBAL):
+        raise every.error(name, "is the name of an observer that every bank has; give the fault another name")
+    return every.table(name)
 
 
 def _fault_model(table: Table, nominal: UncertainModel, names: Mapping[str, Sequence[str]]) -> FaultModel:

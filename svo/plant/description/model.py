@@ -45,7 +45,7 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
             "is missing; expected the half-widths of the measurement noise, one an output, such as n = [0.01] "
             "(0 says that a sensor is exact)",
         )
-    ranges = {key: _range(table, key) for key in RANGES if key in table}
+    ranges = {key: range_of(table, key) for key in RANGES if key in table}
     with table.errors():
         make = UncertainModel.from_continuous if continuous else UncertainModel
         model = make(**{"B": None} | arrays, **rest, **ranges)
@@ -95,7 +95,7 @@ def _disturbance_bounds(table: Table) -> Any:
     return ends.array("lower"), ends.array("upper")
 
 
-def _range(table: Table, key: str) -> Any:
+def range_of(table: Table, key: str) -> Any:
     """Bounds of every state, as { lower, upper } or [lower, upper]; a physical one that is left out is none."""
     if not isinstance(table.content[key], dict):
         return tuple(table.array(key))

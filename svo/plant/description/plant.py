@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,19 +19,23 @@ from svo.logs.dialect.rules import Dialect
 from svo.logs.log import Log
 from svo.logs.names import Column, Columns
 from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.observer import WindowObserver
 from svo.plant import no_schedule
 from svo.plant.description.faults import FaultModel, faults_of
 from svo.plant.description.interval import IntervalSettings, interval_settings
 from svo.plant.description.log import dialect_of
 from svo.plant.description.model import box_of, model_file, model_of
+from svo.plant.description.nonlinear import is_nonlinear, nonlinear_faults_of, nonlinear_model_of
 from svo.plant.description.table import Table, read_table
 from svo.plant.log_file import read_log
 
 _TOP = (
     "title", "Ts", "columns", "log", "model", "initial", "observer", "faults", "global", "bank", "interval_detector",
+    "parameters",
 )  # fmt: skip
 STATED = "stated"
+Model: TypeAlias = UncertainModel | NonlinearModel
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class DescribedPlant(Shown):
     name, title : str
         The file's name, and one line for people.
     columns : Columns
-    model : UncertainModel
+    model : UncertainModel or NonlinearModel
         The healthy plant.
     initial : HPolytope
         Bounded set that contains the state at the first sample.
@@ -74,7 +78,7 @@ class DescribedPlant(Shown):
     name: str
     title: str
     columns: Columns
-    model: UncertainModel
+    model: Model
     initial: HPolytope
     faults: Mapping[str, FaultModel]
     observer: ObserverSettings
@@ -129,7 +133,7 @@ class DescribedPlant(Shown):
             return None
         return detect_thresholds(*self.interval.detector(log, lambda path: read_log(path, self)))
 
-    def _observer(self, model: UncertainModel) -> WindowObserver:
+    def _observer(self, model: Model) -> WindowObserver:
         return WindowObserver(model, self.initial, horizon=self.observer.horizon, template=self.observer.template)
 
 
@@ -147,17 +151,23 @@ def read_description(path: str | Path) -> DescribedPlant:
     top = read_table(path, _TOP)
     columns = _columns(top)
     names = {group: [c.name for c in getattr(columns, group)] for group in ("inputs", "outputs", "states")}
-    model = model_of(top, {group: found for group, found in names.items() if found})
-    faults = faults_of(top, model, names)
+    model: Model
+    if is_nonlinear(top):
+        model = nonlinear_model_of(top, names)
+        faults = nonlinear_faults_of(top, model)
+    else:
+        model = model_of(top, {group: found for group, found in names.items() if found})
+        faults = faults_of(top, model, names)
+    initial = box_of(top.table("initial"), model.n_states)
     _check_architecture(top, faults)
     return DescribedPlant(
         name=path.name,
         title=top.text("title", path.stem),
         columns=columns,
         model=model,
-        initial=box_of(top.table("initial"), model.n_states),
+        initial=initial,
         faults=faults,
-        observer=_observer_settings(top, model),
+        observer=_observer_settings(top, model, initial),
         global_set=box_of(top.table("global"), model.n_states) if "global" in top else None,
         bank_options=_bank_options(top),
         files=_files(path, top.table("model")),
@@ -166,7 +176,7 @@ def read_description(path: str | Path) -> DescribedPlant:
     )
 
 
-def _wider(model: UncertainModel, widening: Array) -> UncertainModel:
+def _wider(model: Model, widening: Array) -> Model:
     return model.replace(n=np.asarray(model.n, dtype=float) + widening)
 
 
@@ -191,7 +201,7 @@ def _group(table: Table, key: str) -> tuple[Column, ...]:
     return tuple(Column(entry.text("name"), entry.text("unit")) for entry in table.tables(key, ("name", "unit")))
 
 
-def _observer_settings(top: Table, model: UncertainModel) -> ObserverSettings:
+def _observer_settings(top: Table, model: Model, initial: HPolytope) -> ObserverSettings:
     table = top.table("observer", ("horizon", "template"))
     horizon: int | None = None
     if table.content.get("horizon") != "full":
@@ -202,9 +212,12 @@ def _observer_settings(top: Table, model: UncertainModel) -> ObserverSettings:
     if "template" in table and table.content["template"] != "box":
         template = table.array("template")
     with table.errors():
-        # An observer checks its own arguments.
-        anywhere = HPolytope.box(np.zeros(model.n_states), np.ones(model.n_states))
-        WindowObserver(model.replace(physical=None, largest=None), anywhere, horizon=horizon, template=template)
+        # An observer checks its own arguments; that of a nonlinear model the first set too.
+        first = initial
+        if isinstance(model, UncertainModel):
+            model = model.replace(physical=None, largest=None)
+            first = HPolytope.box(np.zeros(model.n_states), np.ones(model.n_states))
+        WindowObserver(model, first, horizon=horizon, template=template)
     return ObserverSettings(horizon, template)
 
 

@@ -1,0 +1,91 @@
+"""The tables [model] with dynamics, [parameters] and [faults.NAME] of a nonlinear plant: equations as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from svo.models.nonlinear import NonlinearModel
+from svo.plant.description.faults import FaultModel, check_name
+from svo.plant.description.model import range_of
+from svo.plant.description.table import Table
+
+_MODEL = (
+    "dynamics", "outputs", "disturbances", "n", "physical", "valid", "largest", "varying", "continuous",
+)  # fmt: skip
+_RANGES = ("physical", "valid", "largest")
+
+
+def is_nonlinear(top: Table) -> bool:
+    """Whether [model] has equations instead of matrices."""
+    return "dynamics" in top.table("model")
+
+
+def nonlinear_model_of(top: Table, names: Mapping[str, Sequence[str]]) -> NonlinearModel:
+    """The model of [model] and [parameters]; inputs and outputs are the columns of these names."""
+    table = top.table("model", _MODEL)
+    dynamics, outputs = _texts(table, "dynamics"), _texts(table, "outputs")
+    if "n" not in table:
+        raise table.error("n", "is missing; expected the half-widths of the measurement noise, one an output")
+    if set(outputs) != set(names["outputs"]):
+        raise table.error("outputs", f"are {', '.join(outputs)}; expected one each of {', '.join(names['outputs'])}")
+    if names["states"] and len(names["states"]) != len(dynamics):
+        raise top.table("columns").error(
+            "states", f"names {len(names['states'])} columns; expected {len(dynamics)}, one each of [model] dynamics"
+        )
+    bounds = _bounds(table.table("disturbances"))
+    ranges = {key: range_of(table, key) for key in _RANGES if key in table}
+    with table.errors():
+        return NonlinearModel(
+            dynamics, outputs, states=list(dynamics), inputs=names["inputs"], outputs=names["outputs"],
+            disturbances=list(bounds), w=([low for low, _ in bounds.values()], [high for _, high in bounds.values()]),
+            parameters=_numbers(top.table("parameters")), Ts=top.number("Ts"), n=table.array("n"),
+            varying=table.content.get("varying", ()), continuous=table.truth("continuous", True), **ranges,
+        )  # fmt: skip
+
+
+def nonlinear_faults_of(top: Table, nominal: NonlinearModel) -> dict[str, FaultModel]:
+    """Faults of type "parameter": other bounds of some parameters."""
+    every = top.table("faults")
+    return {name: _parameter_fault(check_name(every, name), nominal) for name in every.content}
+
+
+def _parameter_fault(table: Table, nominal: NonlinearModel) -> FaultModel:
+    table.text("type", choices=("parameter",))
+    table.check_keys(("type", "parameters"))
+    changed = _numbers(table.table("parameters", tuple(nominal.parameters)))
+    if not changed:
+        raise table.error("parameters", f"is missing; expected bounds of any of {', '.join(nominal.parameters)}")
+    with table.errors():
+        model = nominal.replace(parameters={**nominal.parameters, **changed})
+    (low, high), (least, most) = model.flow.w, nominal.flow.w
+    return FaultModel(model, contains_nominal=bool((low <= least).all() and (high >= most).all()))
+
+
+def _texts(table: Table, key: str) -> dict[str, str]:
+    if key not in table:
+        raise table.error(key, 'is missing; expected a table of expressions, such as { h = "(Q - a * sqrt(h)) / S" }')
+    inner = table.table(key)
+    return {name: inner.text(name) for name in inner.content}
+
+
+def _bounds(table: Table) -> dict[str, tuple[float, float]]:
+    """Of disturbances: a half-width, or [lower, upper]."""
+    found = {}
+    for name, value in _numbers(table).items():
+        found[name] = value if isinstance(value, tuple) else (-value, value)
+    return found
+
+
+def _numbers(table: Table) -> dict[str, Any]:
+    """Each a number, or [lower, upper]."""
+    found: dict[str, Any] = {}
+    for name, value in table.content.items():
+        if not isinstance(value, list):
+            found[name] = table.number(name)
+            continue
+        ends = table.array(name)
+        if ends.shape != (2,):
+            raise table.error(name, f"has shape {ends.shape}; expected a number, or [lower, upper]")
+        found[name] = tuple(ends.tolist())
+    return found

@@ -1,0 +1,118 @@
+"""Nonlinear plants in TOML: equations as text, parameters, faults of parameters, from a log to a proven alarm."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from polytopes import HPolytope
+from svo import WindowObserver
+from svo.cli import app
+from svo.models import ModelSample, model_digest
+from svo.plant.description import read_description
+
+EXAMPLES = Path(__file__).parents[4] / "docs" / "examples"
+TANKS = (EXAMPLES / "two_tanks.toml").read_text(encoding="utf-8")
+
+
+def described(tmp_path: Path, old: str = "", new: str = ""):
+    """The plant of the example with one change."""
+    assert old in TANKS
+    path = tmp_path / "two_tanks.toml"
+    path.write_text(TANKS.replace(old, new, 1), encoding="utf-8")
+    return read_description(path)
+
+
+def test_a_description_is_the_plant_that_it_says(tmp_path: Path) -> None:
+    plant = described(tmp_path)
+    model = plant.model
+    assert model.names == {
+        "states": ("h1", "h2"), "inputs": ("pump",), "outputs": ("level_1", "level_2"), "disturbances": ("d1", "d2"),
+    }  # fmt: skip
+    z = np.array([30.0, 12.0, 0.001, -0.001, *([0.0] * len(model.parameters)), 60.0])
+    flow = 0.25 * np.sqrt(1962.0 * 18.0)
+    expected = [(60.0 - flow) / 154.0 + 0.001, (flow - 0.3 * np.sqrt(1962.0 * 12.0)) / 154.0 - 0.001]
+    assert model.flow.tape.values(z) == pytest.approx(expected, rel=1e-12)
+    assert plant.faults["leak"].contains_nominal
+    assert plant.faults["leak"].model.parameters["hole"] == (0.0, 0.2)
+    assert plant.faults["leak"].model.parameters["pipe"] == 0.25
+
+
+def test_an_alarm_is_found_proven_and_says_what_was_not_checked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("two_tanks.toml", "two_tanks.csv"):
+        shutil.copy(EXAMPLES / name, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    found = CliRunner().invoke(app, ["detect", "two_tanks.toml", "two_tanks.csv", "--out", "found"])
+    assert found.exit_code == 0, found.output
+    assert "Fault isolated at 122 s: leak." in found.output
+    proven = CliRunner().invoke(app, ["verify", "found/alarms.jsonl"])
+    assert proven.exit_code == 0, proven.output
+    assert "2 of 2 alarms proven" in proven.output
+    assert "that the matrices enclose the nonlinear plant was proven when they were made" in proven.output
+    chain = CliRunner().invoke(app, ["verify", "found/alarms.jsonl", "--full", "two_tanks.csv"])
+    assert chain.exit_code == 1
+    assert "bounds of a nonlinear model are not proven from the first sample on" in chain.output
+    for line in (tmp_path / "found" / "alarms.jsonl").read_text(encoding="utf-8").splitlines():
+        assert json.loads(line)["source"]["model"] == "nonlinear"
+
+
+def test_an_alarm_of_other_equations_is_not_the_plants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    plant, other = described(tmp_path), described(tmp_path, "area = 154.0", "area = 154.5")
+    sample = ModelSample.of(plant.model.carrier, plant.model.carrier.schedule)
+    digests = {model_digest(p.model, {"horizon": 10}, [sample]) for p in (plant, other)}
+    assert len(digests) == 2
+    observer = WindowObserver(plant.model, HPolytope.box([28, 10], [32, 14]))
+    assert model_digest(plant.model, {"horizon": 10}, [sample]) in digests
+    assert observer.options["horizon"] == 10
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("hole * sqrt", "leak * sqrt", r"\[model\]: f, row h1: unknown symbol 'leak'.*column"),
+        ("g2 * h2)) / area + d2", "g2 * h2)) / area + d3", "row h2: unknown symbol 'd3'; expected one of h1, h2"),
+        ("(pump - pipe", "(__import__('os') - pipe", "unknown function '__import__'"),
+        ('level_1 = "h1"\n', "", r"\[model\], key 'outputs': are level_2; expected one each of level_1, level_2"),
+        ("n = [0.1, 0.1] ", "n = [0.1] ", "n has shape"),
+        ("n = [0.1, 0.1] ", "", r"\[model\], key 'n': is missing"),
+        ("hole = 0.0", 'hole = "none"', r"\[parameters\], key 'hole': is 'none'; expected a number"),
+        ("hole = 0.0", "hole = [0.2, 0.0]", "hole is between 0.2 and 0.0; expected lower <= upper"),
+        ("hole = 0.0", "hole = [0.2]", r"\[parameters\], key 'hole': has shape \(1,\); expected a number, or"),
+        ("physical = [[0.0, 0.0], [60.0, 60.0]]", "", "largest is missing"),
+        ("d2 = 0.002 }", "d2 = -0.002 }", "d2 is between 0.002 and -0.002"),
+        ('{ hole = [0.0, 0.2] }', "{ hol = [0.0, 0.2] }", "faults.leak.parameters.*did you mean 'hole'"),
+        ('{ hole = [0.0, 0.2] }', "{}", r"\[faults.leak\], key 'parameters': is missing"),
+        ('type = "parameter"\nparameters = { h', 'type = "sensor"\nparameters = { h', "expected one of parameter"),
+        ("lower = [28.0, 10.0]", "lower = [28.0]", r"\[initial\]"),
+        ('h1 = "(pump', 'h3 = "(pump', r"unknown symbol 'h1'"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_named_with_file_table_and_key(tmp_path: Path, old: str, new: str, why: str) -> None:
+    with pytest.raises(ValueError, match=why) as caught:
+        described(tmp_path, old, new)
+    assert str(caught.value).startswith(str(tmp_path))
+
+
+def test_the_page_shows_the_example_and_what_the_commands_print(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("two_tanks.toml", "two_tanks.csv"):
+        shutil.copy(EXAMPLES / name, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    page = (EXAMPLES.parent / "nonlinear.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```console\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    commands = re.findall(r"^\$ svo (.*?)\n((?:[^$].*\n)*)", "".join(blocks), re.MULTILINE)
+    assert len(commands) == 2
+    for arguments, shown in commands:
+        done = CliRunner().invoke(app, arguments.split())
+        assert done.exit_code == 0, done.output
+        assert re.sub(r"in \d+\.\d\d s", "", done.stdout) == re.sub(r"in \d+\.\d\d s", "", shown)
