@@ -8,7 +8,7 @@
 #define FEASIBILITY 1e-9   /* violation of a scaled row or variable that counts as none */
 #define ROUNDED (1e3 * UNIT) /* of the terms of a row: what its sums may have lost, besides */
 #define NEAR_WORST 0.5     /* of the worst violation: rows from which on the exact norm is asked */
-#define REFACTOR 60        /* pivots between factorisations */
+#define REFACTOR 60        /* pivots between factorisations, or as many as the basis has rows: each costs like those */
 #define STALLED 1000       /* pivots after which the cost must have fallen: by rounding, a program could go on for ever */
 
 /* target = row of the inverse's rows combined: sum over b of factor_b inverse[b, :]. */
@@ -252,7 +252,7 @@ integer dual_simplex(const window *w, integer q, integer limit)
     integer k = prepare_basis(w, q, w->k[q]), since = 0, pivots = 0, outcome = STOPPED;
     double value = INFINITY;
     for (;;) {
-        if (since >= REFACTOR) {
+        if (since >= most(REFACTOR, k)) {
             since = 0;
             k = prepare_basis(w, q, factor_basis(w, q, k, k, CLEAN_PIVOT));
         }

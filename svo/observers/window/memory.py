@@ -42,6 +42,8 @@ class WindowSettings:
     eps : float
     sign_split : int
         As in `svo.WindowObserver`.
+    slide : int or None
+        Samples that the window slides by, at most N, where tests ask for another number than 2 N // 5.
     """
 
     form: NormalForm
@@ -49,11 +51,12 @@ class WindowSettings:
     template: Array
     eps: float
     sign_split: int
+    slide: int | None = None
 
     @cached_property
     def block(self) -> int:
         """Samples that the window slides by."""
-        return 1 if self.horizon is None else max(1, 2 * self.horizon // 5)
+        return self.slide or (1 if self.horizon is None else max(1, 2 * self.horizon // 5))
 
     @property
     def first_steps(self) -> int:
