@@ -172,7 +172,7 @@ class Cursor:
 
 
 def kind_of(flags: int) -> str:
-    """"numbers" for real ones, else in words what a matrix is.
+    """ "numbers" for real ones, else in words what a matrix is.
 
     Raises
     ------

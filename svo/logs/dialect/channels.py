@@ -77,6 +77,15 @@ class Channels:
         column = self.rule(name).column
         return name if column is None else column
 
+    def flag(self, name: str, block: Block, row: int) -> str:
+        """What is said of a flag beside a reading, if the channel has one."""
+        valid = self.rule(name).valid or self._dialect.valid
+        if valid is None:
+            return ""
+        return (
+            f", and {block.source.label(valid.column)} is {str(block.source.column(valid.column)[block.rows[row]])!r}"
+        )
+
     def series(self, column: Column) -> Series:
         """The readings of a channel.
 

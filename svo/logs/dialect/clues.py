@@ -137,6 +137,15 @@ def is_number(cell: str) -> bool:
     return bool(_POINT.plain(cell) or _COMMA.plain(cell) or _GROUPS.fullmatch(cell))
 
 
+def number_in(cell: str) -> float | None:
+    """What a cell is as a number with either mark, or with groups of thousands; None if it is none."""
+    plain = _POINT.plain(cell) or _COMMA.plain(cell)
+    if plain is None and _GROUPS.fullmatch(cell):
+        plain = re.sub(r"[,.' ](?=\d{3}(?:\D|$))", "", cell).replace(",", ".")
+        plain = _POINT.plain(plain)
+    return None if plain is None else float(plain)
+
+
 def marks_in(columns: Sequence[Sequence[str]]) -> tuple[str, str]:
     """Decimal and thousands marks of the numbers in columns; "" of thousands if there are none."""
     cells = [cell for column in columns for cell in column]

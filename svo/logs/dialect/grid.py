@@ -15,7 +15,7 @@ from svo.checks import Array
 from svo.logs.columns import TIME_TOLERANCE
 from svo.logs.dialect.rules import Channel, Times
 from svo.logs.dialect.series import Series
-from svo.logs.dialect.stamps import UNITS, seconds
+from svo.logs.dialect.stamps import UNITS, moment, seconds
 
 _FITS = 0.05  # relative: a unit fits if with it the median step is the sampling time within so much
 _FASTER = 0.75  # of the sampling time: readings that come sooner are those of a faster channel
@@ -50,6 +50,7 @@ def grid_of(anchor: Series, Ts: float) -> Array:
     A channel that drifts keeps its own times as long as its steps are sampling times within 1 %.
     """
     time = anchor.time(anchor.stamp(0))
+    _check_span(anchor, time, Ts)
     index = np.round(time / Ts)
     tolerance = _tolerance(Ts)
     if (np.abs(time - index * Ts) <= tolerance).all() and (np.diff(index) > 0).all():
@@ -59,6 +60,20 @@ def grid_of(anchor: Series, Ts: float) -> Array:
         own = np.concatenate([[0.0], np.cumsum(counts)])
         return np.asarray(np.interp(np.arange(int(own[-1]) + 1), own, time), dtype=float)
     return np.asarray(Ts * np.arange(int(np.floor((time[-1] + tolerance) / Ts)) + 1), dtype=float)
+
+
+def most_samples(readings: int) -> int:
+    """Samples that a grid may have: a stamp far from all others would make one of nothing but lost samples."""
+    return 1000 * readings + 1_000_000
+
+
+def _check_span(one: Series, time: Array, Ts: float) -> None:
+    if time.size and time[-1] / Ts > most_samples(time.size):
+        i = int(np.argmax(np.diff(time))) + 1
+        raise ValueError(
+            f"{one.place(i)}: time jumps from {time[i - 1]:.9g} s to {time[i]:.9g} s after the first reading, which "
+            f"would be {(time[i] - time[i - 1]) / Ts:.3g} lost samples; is that stamp right, and its unit?"
+        )
 
 
 def check_unit(anchor: Series, Ts: float, rule: Times) -> None:
@@ -144,8 +159,16 @@ def _changes_between(series: Series, time: Array, i: int, grid: Array, Ts: float
         f"{series.place(i)}: input {series.name} changes at {time[i]:.9g} s, {away:.3g} s off the samples of {Ts:g} s "
         f"({count} such changes). An input is never moved in time: a model of discrete time takes inputs that change "
         "at its samples. If it does, and only its stamps are late, state its times, "
-        f"[log.columns.{series.name}] time = {{ start = 0, step = {Ts:g} }}"
+        f"[log.columns.{series.name}] time = {{ start = {_start(series)}, step = {Ts:g} }}"
     )
+
+
+def _start(series: Series) -> str:
+    """The time of the first row as a description states it."""
+    first = series.block.time[0]
+    if not series.block.is_date:
+        return f"{seconds(first):.15g}"
+    return moment(first).replace(" ", "T") + ("" if series.block.is_local else "Z")
 
 
 def _check_rate(series: Series, rule: Channel, time: Array, off: np.ndarray, Ts: float) -> None:

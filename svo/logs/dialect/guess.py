@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from svo.logs.dialect.clues import Layout, Text, cells_of, is_number, layout_of, marks_in, text_of
+from svo.logs.dialect.clues import Layout, Text, cells_of, is_number, layout_of, marks_in, number_in, text_of
 from svo.logs.dialect.dates import suggested
 from svo.logs.dialect.mat import places_in
 from svo.logs.dialect.signatures import Signature, signature_of
@@ -187,7 +187,7 @@ class _Proposal:
 
     def _unit_of_stamps(self, i: int) -> str:
         """What follows the column of stamps in the table: by the sampling time, or by its name."""
-        numbers = np.unique([float(cell.replace(",", ".")) for cell in self._cells[i] if is_number(cell)])
+        numbers = np.unique([value for cell in self._cells[i] if (value := number_in(cell)) is not None])
         step = float(np.median(np.diff(numbers))) if numbers.size > 1 else 0.0
         if self._Ts is not None:
             fits = [f'unit = "{name}"' for name, pico in UNITS.items() if _fits(step * seconds(pico), self._Ts)]
@@ -300,7 +300,7 @@ def _is_clock(cells: Sequence[str]) -> bool:
 
 
 def _is_rising(cells: Sequence[str]) -> bool:
-    numbers = [float(c.replace(",", ".")) for c in cells if re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?", c)]
+    numbers = [value for cell in cells if (value := number_in(cell)) is not None]
     return len(numbers) > 2 and all(a < b for a, b in pairwise(numbers))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from svo.checks import Array
 from svo.logs.columns import TIME_TOLERANCE, LogNote
 from svo.logs.dialect.channels import Channels, when
-from svo.logs.dialect.grid import Placed, check_unit, grid_of, place_input, place_output
+from svo.logs.dialect.grid import Placed, check_unit, grid_of, most_samples, place_input, place_output
 from svo.logs.dialect.rules import Dialect
 from svo.logs.dialect.series import Series
 from svo.logs.dialect.stamps import PICO, seconds
@@ -122,7 +122,9 @@ class _Placing:
         """The grid, which goes on where inputs are held; readings beside it are counted."""
         ends = [seconds(one.stamp(-1) - self._origin) for one in self._series.values() if one.values.size]
         more = int(np.floor((max(ends) - grid[-1]) / self._Ts + TIME_TOLERANCE))
-        if more > 0 and all(self._channels.rule(column.name).hold for column in self._columns.inputs):
+        if 0 < more <= most_samples(grid.size) and all(
+            self._channels.rule(column.name).hold for column in self._columns.inputs
+        ):
             grid = np.append(grid, grid[-1] + self._Ts * np.arange(1, more + 1))
         for name, one in self._series.items():
             time = one.time(self._origin)
@@ -175,7 +177,8 @@ class _Placing:
         if row is not None:
             where = f"{one.block.place(row)}, {one.label}"
             cell = one.block.source.column(self._channels.which(one.name))[one.block.rows[row]]
-            what = f"the cell is {str(cell)!r:.60}"
+            flag = self._channels.flag(one.name, one.block, row)
+            what = f"the cell is {str(cell)!r:.60}{flag}"
         more = f" (and at {count - 1} samples more)" if count > 1 else ""
         return ValueError(
             f"{where}: input {one.name} has no reading at {time:.9g} s{more}: {what}. An input must be known: state "

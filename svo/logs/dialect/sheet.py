@@ -113,7 +113,7 @@ def read_sheet(path: Path, dialect: Dialect) -> Sheet:
         cells = [cell.strip() for cell in row]
         if not any(cells) or line < (dialect.first_row or 0):
             continue
-        if _ends_cut(cells) == _ends_cut(names):
+        if cells[0] == names[0] and _ends_cut(cells) == _ends_cut(names):
             again.append(line)
             continue
         found.append(_fitted(str(path), line, cells, names))
@@ -218,6 +218,8 @@ def _ends_cut(cells: Sequence[str]) -> list[str]:
 
 def _fitted(source: str, line: int, cells: list[str], names: Sequence[str]) -> list[str]:
     """As many cells as there are names: a short row is padded, and what is too much must be empty."""
+    if len(cells) == len(names):
+        return cells
     extra = [cell for cell in cells[len(names) :] if cell]
     if extra:
         raise ValueError(

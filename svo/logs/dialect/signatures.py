@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+
+from svo.logs.dialect.numbers import Marks
+
+_DATE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?")
 
 
 @dataclass(frozen=True)
@@ -48,19 +53,21 @@ def signature_of(lines: Sequence[str]) -> Signature | None:
 
 
 def _labview(lines: Sequence[str]) -> Signature:
-    said = {}
+    said: dict[str, list[str]] = {}
     ends = [i for i, line in enumerate(lines) if line.startswith("***End_of_Header***")]
     separator = "," if any(line.replace(",", "\t").startswith("Separator\tComma") for line in lines[:12]) else "\t"
     for line in lines[: (ends or [0])[-1]]:
         key, *values = line.split(separator)
         said[key] = [value.strip() for value in values]  # what the last header says
-    decimal = said.get("Decimal_Separator", ["."])[0] or "."
-    header = ends[-1] + 2 if ends else None
-    time = None
-    if said.get("X_Columns", [""])[0] == "No" and "Delta_X" in said:
-        step = float(said["Delta_X"][0].replace(",", "."))
-        start = f"{said.get('Date', ['1970/01/01'])[0].replace('/', '-')}T{said.get('Time', ['00:00:00'])[0]}"
-        time = f"{{ start = {start.replace(',', '.')[:26]}, step = {step:.12g} }}"
+
+    def first(key: str) -> str:
+        return next(iter(said.get(key, [])), "")
+
+    decimal = first("Decimal_Separator") or "."
+    step, time = Marks(decimal).plain(first("Delta_X")), None
+    if first("X_Columns") == "No" and step is not None:
+        start = f"{first('Date').replace('/', '-')}T{first('Time')}".replace(",", ".")[:26]
+        time = f"{{ start = {start if _DATE.fullmatch(start) else 0}, step = {float(step):.12g} }}"
     units = {i + 1: unit for i, unit in enumerate(said.get("Y_Unit_Label", [])) if unit}
-    keys = {"decimal": f'"{decimal}"'} if decimal != "." else {}
-    return Signature("LabVIEW measurement file", separator, keys, time, header, None, units)
+    keys = {"decimal": '","'} if decimal == "," else {}
+    return Signature("LabVIEW measurement file", separator, keys, time, ends[-1] + 2 if ends else None, None, units)

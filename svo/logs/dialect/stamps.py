@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal
+from functools import lru_cache
 from typing import TypeVar
 
 from svo.logs.dialect.dates import suggested
@@ -24,6 +26,7 @@ UNITS = {
 }  # fmt: skip
 """Units of stamps in picoseconds."""
 
+_LONGEST = PICO * 10**18
 _EPOCH = datetime(1970, 1, 1)
 _FRACTION = re.compile(r"(?<=\d)[.,](\d+)(?=\s*(?:[A-Za-z+-].*)?$)")
 _CLOCK = re.compile(
@@ -85,8 +88,14 @@ def counted(picoseconds: list[int], where: Where, rule: Times) -> Stamps:
     if rule.zone is None:
         return Stamps(found, is_date=True)
     # Whole microseconds are a date; what is left of a stamp is carried along.
-    dates = [(_EPOCH + timedelta(microseconds=stamp // 10**6), stamp % 10**6) for stamp in found]
-    return _dated(dates, where, rule.zone)
+    return _dated([_date(stamp, where, i) for i, stamp in enumerate(found)], where, rule.zone)
+
+
+def _date(stamp: int, where: Where, i: int) -> tuple[datetime, int]:
+    try:
+        return _EPOCH + timedelta(microseconds=stamp // 10**6), stamp % 10**6
+    except OverflowError:
+        raise ValueError(f"{where(i)}: {stamp / PICO:.6g} s after 1970 is no date; another unit or scale?") from None
 
 
 def seconds(picoseconds: int) -> float:
@@ -112,7 +121,10 @@ def _counted(cell: str, where: Where, i: int, rule: Times, marks: Marks) -> int:
     plain = marks.plain(cell)
     if plain is None:
         raise ValueError(f"{where(i)}: {_named(cell)} is no number{_how(cell)}")
-    return round(Decimal(plain) * Decimal(repr(rule.scale)) * UNITS[rule.unit or "s"])
+    time = Decimal(plain) * Decimal(repr(rule.scale)) * UNITS[rule.unit or "s"]
+    if abs(time) > _LONGEST:
+        raise ValueError(f"{where(i)}: {cell!r:.60} is no time of a log; another unit or scale?")
+    return round(time)
 
 
 def _how(cell: str) -> str:
@@ -146,7 +158,16 @@ def _read(cell: str, where: Where, i: int, read: Callable[[str], Read], expected
 def _by_format(form: str) -> Callable[[str], tuple[datetime, int]]:
     whole = re.sub(r"[.,:]?%f", "", form)
 
+    ends_in_fraction = re.search(r"[.,]%f(\s*%[pzZ])?$", form) is not None
+    whole_seconds = lru_cache(4096)(lambda text: datetime.strptime(text, whole))  # many stamps share theirs
+
     def read(text: str) -> tuple[datetime, int]:
+        found = _FRACTION.search(text) if ends_in_fraction else None
+        if found is not None:
+            with suppress(ValueError):
+                digits = int(found[1][:12].ljust(12, "0"))
+                date = whole_seconds(text[: found.start()] + text[found.end(1) :])
+                return date.replace(microsecond=digits // 10**6), digits % 10**6
         text, rest = _microseconds(text) if "%f" in form else (text, 0)
         try:
             return datetime.strptime(text, form), rest
