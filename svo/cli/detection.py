@@ -77,12 +77,14 @@ def detect(
     noise = chosen_noise(the_plant, noise)
     shown: Detection | None = None
     if wanted is None:
-        samples = survey_log(log, the_plant)
+        with busy("Reading"):
+            samples = survey_log(log, the_plant)
         with progress("Samples") as update:
             found: Findings = detect_streamed(the_plant, samples, noise, progress=update)
     else:  # which shows every sample
         wanted.check(the_plant, noise)
-        data = face.read_log(log, the_plant)
+        with busy("Reading"):
+            data = face.read_log(log, the_plant)
         with progress("Samples") as update:
             found = shown = face.detect(the_plant, data, noise, progress=update)
     if out is not None:

@@ -173,6 +173,7 @@ def report(
     from svo.checks import optional_import
 
     optional_import("pyarrow", "study", "studies")  # first: what is imported next needs the extra too
+    from svo.cli.progress import busy
     from svo.plant import load_plant
     from svo.studies.isolation.publish import publish
     from svo.studies.isolation.store import StudyFolder
@@ -181,10 +182,11 @@ def report(
 
     study = StudyFolder(folder)
     the_plant = load_plant(study.identity()["configuration"]["plant"])
-    if isinstance(the_plant, LearnsDetectors):
-        publish_detectors(study, the_plant, without_damaged, formats.split(","))
-    else:
-        publish(study, the_plant, without_damaged, formats.split(","))
+    with busy("Writing summary, pictures and report"):
+        if isinstance(the_plant, LearnsDetectors):
+            publish_detectors(study, the_plant, without_damaged, formats.split(","))
+        else:
+            publish(study, the_plant, without_damaged, formats.split(","))
     for line in study.notes():
         note(line)
     typer.echo(f"Report: {folder / 'report.html'}")
@@ -212,6 +214,7 @@ def simulate(
     Example:
       svo simulate eclipse --fault elevator --profile step --out log.csv
     """
+    from svo.cli.progress import busy
     from svo.logs.file import write_log
     from svo.plant import HEALTHY, fault_start
     from svo.studies.configuration import check_fault
@@ -228,7 +231,8 @@ def simulate(
     else:
         check_fault(the_plant, fault, profile)
         profile = profile or the_plant.faults[fault][0]
-    log = the_plant.simulate(fault, profile, noise, seed)
+    with busy("Simulating"):
+        log = the_plant.simulate(fault, profile, noise, seed)
     write_log(out, log, the_plant.columns)
     start = fault_start(the_plant, fault, profile)
     if as_json:

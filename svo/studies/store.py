@@ -33,6 +33,7 @@ from svo.studies.configuration import Job, StudyConfiguration
 FORMAT = "svo-study-3"
 ALARMS, SAMPLES = "alarms", "exemplar"  # what belongs to a run beside its rows
 _SHOWN = 5
+_PICTURES = ("*.png", "*.svg", "*.pdf")
 
 
 Written = Mapping[str, Callable[[Path], Any]]
@@ -78,7 +79,7 @@ class StudyStore(Generic[Row]):
         ``added`` names the folders of what its plant adds to a study; errors as `svo.store.clear_results`.
         """
         expect_one_way(resume)
-        own = ("runs.parquet", "alarms*", "exemplars", "*.csv", "*.png", "*.html", *added)
+        own = ("runs.parquet", "alarms*", "exemplars", "*.csv", "*.html", *_PICTURES, *added)
         clear_results(self.path, self._identity.name, own)
 
     @contextmanager

@@ -184,6 +184,17 @@ def test_figures_are_json_without_words_that_json_has_not(capsys: pytest.Capture
     assert json.loads(capsys.readouterr().out) == {"a": [None, 1.0, [None]], "b": {"c": None}, "d": "NaN"}
 
 
+def test_commands_print_json_and_nothing_else(registered_tank: str, tmp_path: Path) -> None:
+    assert svo("detect", CART, LOG, "--out", tmp_path).exit_code == 0
+    healthy = tmp_path / "healthy.csv"
+    healthy.write_text("".join(LOG.read_text().splitlines(keepends=True)[:30]))
+    for command in (
+        ("plants",), ("detect", CART, LOG), ("verify", tmp_path / "alarms.jsonl"), ("calibrate", CART, healthy),
+        ("import", LOG, "--toml", CART, "--out", tmp_path / "log.parquet"),
+    ):  # fmt: skip
+        assert figures(svo(*command, "--json"))
+
+
 def test_a_watch_tells_a_program_what_happens() -> None:
     lines = svo("watch", CART, LOG, "--until-end", "--json").stdout.splitlines()
     events = [json.loads(line, parse_constant=lambda token: pytest.fail(token)) for line in lines]

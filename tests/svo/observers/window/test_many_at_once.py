@@ -14,7 +14,8 @@ import pytest
 from aircraft.eclipse.plant import eclipse
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver
-from svo.isolation.record import BankRecord, Recorder, Replay
+from svo.isolation.record import BankRecord, Replay
+from svo.isolation.recorder import Recorder
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models import Labels
