@@ -191,7 +191,9 @@ class NonlinearModel(Shown):
 
         Its disturbances are w, p, and one a state between -1 and 1, whose column is the remainder.
         """
-        return carrier_of(self.flow, self.n_inputs, self.noise, self.Ts, self.physical, self.largest)
+        n, nw = self.n_states, len(self.flow.varying)
+        is_disturbed = bool((self.reading.used[n : n + nw] & ~self.flow.varying).any())
+        return carrier_of(self.flow, self.n_inputs, is_disturbed, self.noise, self.Ts, self.physical, self.largest)
 
     def replace(self, **changes: Any) -> NonlinearModel:
         """A copy with ``changes`` of arguments by name, checked again."""
@@ -239,7 +241,7 @@ class NonlinearModel(Shown):
         return found
 
     def output(self, lower: ArrayLike, upper: ArrayLike, u: ArrayLike = ()) -> LinearOutput:
-        """h in C x + c + [-R, R] for all states of a box, all w and all p.
+        """h in C x + c + F (w, p) + [-R, R] for all states of a box, all w and all p; F has only what is held.
 
         Parameters
         ----------
@@ -255,7 +257,8 @@ class NonlinearModel(Shown):
             For a wrong shape, NaN or Inf.
         """
         inputs = finite_array("u", u, (self.n_inputs,))
-        return linear_output(self.reading, self.flow.w, self._box(lower, upper), inputs, self.outputs or ())
+        flow, box = self.flow, self._box(lower, upper)
+        return linear_output(self.reading, flow.w, ~flow.varying, box, inputs, self.outputs or ())
 
     def check_first(self, lower: Array, upper: Array) -> None:
         """Refuse first states from ``lower`` to ``upper`` (n,) for which the equations do not hold or have no value.

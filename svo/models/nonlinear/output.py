@@ -1,4 +1,4 @@
-"""A measurement over a box of states: h(x, u, w, p) in C x + c + [-R, R]."""
+"""A measurement over a box of states: h(x, u, w, p) in C x + c + F (w, p) + [-R, R]."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from svo.checks import Array
 from svo.functions.tape import Tape, Unenclosed
@@ -15,27 +16,33 @@ _EPS = float(np.finfo(np.float64).eps)
 
 
 class LinearOutput(NamedTuple):
-    """h in C x + c + [-R, R] for all states of a box: (ny, n), (ny,), (ny,) arrays."""
+    """h in C x + c + F w + [-R, R] for all states of a box: (ny, n), (ny,), (ny, nw), (ny,) arrays.
+
+    w are disturbances and parameters; F is zero for those that vary inside a sample, whose value is in R.
+    """
 
     C: Array
     c: Array
+    F: Array
     R: Array
 
 
-def linear_output(tape: Tape, w: Span, x: Span, u: Array, names: Sequence[str]) -> LinearOutput:
-    """Of the tape of h, whose disturbances and parameters go into R."""
+def linear_output(
+    tape: Tape, w: Span, shared: NDArray[np.bool_], x: Span, u: Array, names: Sequence[str]
+) -> LinearOutput:
+    """Of the tape of h; the ``shared`` (nw,) of w are those that the state's equation has too."""
     n = len(x.lower)
     try:
         forms = tape.forms(*_joint(x, w, u), free=n + len(w.lower))
     except Unenclosed as error:
         raise _undecided(error, names) from None
-    C, F, centre = forms.g[:, :n], forms.g[:, n:], forms.centre[:n]
-    size = (
-        np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high) + np.abs(C) @ (2.0 * x.largest) + np.abs(F) @ w.largest
-    )
-    R = 0.5 * (forms.high - forms.low) + np.abs(F) @ (0.5 * w.width)
+    C, every, centre = forms.g[:, :n], forms.g[:, n:], forms.centre
+    F = every * shared
+    size = np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high)
+    size += 2.0 * (np.abs(C) @ x.largest + np.abs(every) @ w.largest)
+    R = 0.5 * (forms.high - forms.low) + np.abs(every - F) @ (0.5 * w.width)
     R = R + (n + len(w.lower) + 8) * _EPS * size
-    return LinearOutput(C, forms.k + 0.5 * (forms.low + forms.high) - C @ centre, R)
+    return LinearOutput(C, forms.k + 0.5 * (forms.low + forms.high) - C @ centre[:n] - F @ centre[n:], F, R)
 
 
 def check_output(tape: Tape, w: Span, x: Span, u: Array, names: Sequence[str]) -> None:
@@ -54,14 +61,15 @@ def _undecided(error: Unenclosed, names: Sequence[str]) -> Undecided:
     return Undecided(f"the output {names[error.row]} is not enclosed, {error}")
 
 
-def cut(box: Span, y: Array, reading: LinearOutput, noise: Array) -> Span | None:
+def cut(box: Span, y: Array, reading: LinearOutput, w: Span, noise: Array) -> Span | None:
     """A box cut by what was measured, row by row; None where nothing is left, which a program has to decide."""
     lower, upper = box.lower.copy(), box.upper.copy()
-    C, c = reading.C, reading.c
-    width = noise + reading.R
-    size = np.abs(C) @ box.largest + np.abs(c) + width
+    C, F = reading.C, reading.F
+    c = reading.c + F @ (0.5 * w.lower + 0.5 * w.upper)
+    width = noise + reading.R + np.abs(F) @ (0.5 * w.width)
+    size = np.abs(C) @ box.largest + np.abs(reading.c) + np.abs(F) @ w.largest + width
     for i in np.flatnonzero(~np.isnan(y)).tolist():
-        room = width[i] + 4.0 * (len(lower) + 4) * _EPS * (size[i] + abs(y[i]))
+        room = width[i] + 4.0 * (len(lower) + len(w.lower) + 4) * _EPS * (size[i] + abs(y[i]))
         for j in np.flatnonzero(C[i]).tolist():
             low, high = np.minimum(C[i] * lower, C[i] * upper), np.maximum(C[i] * lower, C[i] * upper)
             least, most = y[i] - c[i] - room - (high.sum() - high[j]), y[i] - c[i] + room - (low.sum() - low[j])

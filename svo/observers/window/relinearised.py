@@ -72,19 +72,20 @@ class Relinearised:
             output = self._cut(y, u)
         except Undecided as error:
             self.reason = self.reason or f"{OUTSIDE_MODEL}: at sample {sample}, {error}"
-            output = LinearOutput(np.zeros((len(y), model.n_states)), np.zeros(len(y)), np.zeros(len(y)))
+            nothing = [np.zeros((len(y), size)) for size in (model.n_states, len(model.flow.varying))]
+            output = LinearOutput(nothing[0], np.zeros(len(y)), nothing[1], np.zeros(len(y)))
             y = np.full(len(y), np.nan)
-        self._now = Linearisation.before(output, model.noise, len(model.flow.w.lower))
+        self._now = Linearisation.before(output, model.noise)
         return self._now, y
 
     def _cut(self, y: Array, u: Array) -> LinearOutput:
         """The output over the box, which it cuts; again over what is left where its remainder blurs the readings."""
-        noise = self.model.noise
+        noise, w = self.model.noise, self.model.flow.w
         output = self.model.output(self.box.lower, self.box.upper, u)
-        left = cut(self.box, y, output, noise)
+        left = cut(self.box, y, output, w, noise)
         if left is not None and (output.R - _BLUNT * noise > 0.0).any():
             output = self.model.output(left.lower, left.upper, u)
-            left = cut(left, y, output, noise)
+            left = cut(left, y, output, w, noise)
         if left is not None:
             self.box = left
         return output

@@ -124,7 +124,8 @@ def crane(**changes: Any) -> Case:
         ]
 
     model = NonlinearModel(
-        f, lambda x, u: [sin(x[0]) + 0.1 * u[0], x[1]], states=["angle", "rate"], inputs=["force"],
+        f, lambda x, u, p, w: [p[0] * sin(x[0]) / 9.8 + 0.1 * u[0], x[1] + 0.01 * w[0]],
+        states=["angle", "rate"], inputs=["force"],
         outputs=["load", "gyro"], disturbances=["wind"], parameters={"gravity": (9.7, 9.9), "drag": (0.1, 0.3)},
         Ts=0.04, n=[0.01, 0.05], w=[0.1], largest=([-1.5, -8], [1.5, 8]),
         **({"varying": ["wind", "drag"]} | changes),

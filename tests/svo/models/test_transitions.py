@@ -69,7 +69,8 @@ def test_an_output_contains_what_is_measured(name: str) -> None:
     found = model.output(lower, upper, u)
     x, w = points(case, lower, upper, rng)
     y = model.reading.values(np.concatenate([x, w, np.broadcast_to(u, (POINTS, len(u)))], axis=1))
-    assert (np.abs(y - x @ found.C.T - found.c) <= found.R + 1e-15).all()
+    assert (np.abs(y - x @ found.C.T - found.c - w @ found.F.T) <= found.R + 1e-15).all()
+    assert not found.F[:, model.flow.varying].any()
 
 
 def test_a_linear_plant_is_discretised_with_a_remainder_of_rounding_only() -> None:
@@ -118,6 +119,26 @@ def test_a_remainder_shrinks_with_the_set(case: Case) -> None:
     u = np.array(case.u(0), dtype=float)
     sizes = [case.model.transition(case.x0 - s * case.spread, case.x0 + s * case.spread, u).R for s in (1.0, 0.1)]
     assert (sizes[1] < sizes[0]).all()
+
+
+def test_units_that_are_powers_of_two_scale_a_transition() -> None:
+    """Levels in 2^-20 cm, flows and seconds as they were."""
+    unit = 2.0**20
+
+    def scaled(h, u, w):
+        return [row * unit for row in plain.f([v / unit for v in h], u, [v / unit for v in w])]
+
+    plain = three_tanks().model
+    other = NonlinearModel(
+        scaled, lambda h: h, states=plain.states, inputs=plain.inputs, disturbances=plain.disturbances, Ts=5.0,
+        n=0.2 * unit, w=[0.003 * unit] * 3, physical=([0] * 3, [62 * unit] * 3),
+    )  # fmt: skip
+    lower, upper = np.array([20.0, 18.0, 19.0]), np.array([20.5, 18.25, 20.25])
+    one = plain.transition(lower, upper, [30.0, 20.0])
+    two = other.transition(lower * unit, upper * unit, [30.0, 20.0])
+    assert two.R / unit == pytest.approx(one.R, rel=1e-9)
+    assert two.a / unit == pytest.approx(one.a, rel=1e-12)
+    assert np.abs(two.A - one.A).max() < 1e-12
 
 
 def test_a_face_of_the_physical_range_may_be_touched() -> None:

@@ -61,6 +61,29 @@ def test_gaps_and_late_readings_keep_the_truth_inside() -> None:
             assert contains(late, log.x[k])
 
 
+def test_a_disturbance_that_a_sensor_reads_is_shared_with_the_state() -> None:
+    """A flow meter narrows the level, unless the flow may move inside a sample."""
+
+    def model(varying):
+        return NonlinearModel(
+            lambda h, w: [w[0] - sqrt(h[0])], lambda h, w: [h[0], w[0] ** 2], states=["h"], disturbances=["flow"],
+            Ts=0.5, n=[0.5, 0.01], w=([1.0], [3.0]), varying=varying, physical=([0], [20]),
+        )  # fmt: skip
+
+    widths = []
+    for varying in ((), "flow"):
+        plant = model(varying)
+        log = plant.simulate([4.0], np.zeros((25, 0)), np.random.default_rng(SEED), corners=True)
+        record = [
+            (step.verdict, step.box, k)
+            for k, step in enumerate(drive(WindowObserver(plant, HPolytope.box([3], [5])), log))
+        ]
+        assert {verdict for verdict, _, _ in record} == {"consistent"}
+        assert all(low[0] <= log.x[k, 0] <= high[0] for _, (low, high), k in record)
+        widths.append(np.mean([high[0] - low[0] for _, (low, high), k in record if k > 10]))
+    assert widths[0] < 0.3 * widths[1]
+
+
 def test_a_linear_plant_is_observed_as_a_linear_model_observes_it() -> None:
     A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [1.0]])
     common = {"Ts": 0.1, "n": [0.02], "w": [0.3]}
