@@ -229,12 +229,15 @@ def results_table(timings: list[Timing]) -> Table:
 
 
 def draw(timings: list[Timing], path: Path) -> None:
-    """Bars of all timings on a logarithmic axis."""
+    """Points of all timings on a logarithmic axis."""
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots(figsize=(9.0, 0.28 * len(timings) + 1.0), layout="constrained")
     colors = ["tab:blue" if t.difference is None else "tab:gray" for t in timings]
-    ax.barh([f"{t.case}: {t.method}" for t in timings], [t.milliseconds for t in timings], color=colors)
+    names = [f"{t.case}: {t.method}" for t in timings]
+    ax.scatter([t.milliseconds for t in timings], range(len(timings)), c=colors, zorder=2)
+    ax.set_yticks(range(len(timings)), names)
+    ax.grid(axis="x", color="0.85")
     ax.set_xscale("log")
     ax.set_xlabel("CPU milliseconds")
     ax.invert_yaxis()
