@@ -25,6 +25,7 @@ _CHANNEL = (
     "column", "tag", "file", "time", "scale", "offset", "unit", "number", "resolution", "missing", "sentinels", "valid",
     "held", "every", "rate",
 )  # fmt: skip
+ALL_KEYS = (*_LOG, *_TIME, *_CHANNEL)
 _OUTPUTS_ONLY = {
     "resolution": "an input is taken as exact; widen w of [model] by what it is not",
     "held": 'an input stays what it was by missing = "hold"',
@@ -69,9 +70,9 @@ def _marks(table: Table) -> dict[str, str]:
             raise table.error(key, f"is {mark!r}; expected one character")
     if found["decimal"] not in (".", ","):
         raise table.error("decimal", f'is {found["decimal"]!r}; expected "." or ","')
-    for one, other in (("separator", "decimal"), ("decimal", "thousands")):
-        if found[one] == found[other]:
-            raise table.error(other, f"is {found[other]!r}, as {one} is; expected two marks that can be told apart")
+    # A separator may be a mark of numbers too, where cells are quoted.
+    if found["decimal"] == found["thousands"]:
+        raise table.error("thousands", f"is {found['thousands']!r}, as decimal is; expected two marks that differ")
     return found
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from svo.plant.description.log import ALL_KEYS
 from tests.svo.logs.dialect.carts import cart
 
 TIME = 'time = { column = "t" }\n'
@@ -17,7 +19,6 @@ TIME = 'time = { column = "t" }\n'
         ("[log]\nseperator = ';'", ["[log]", "'seperator'", "'separator'"]),
         ("[log]\nseparator = ';;'", ["'separator'", "one character"]),
         ("[log]\ndecimal = ';'", ["'decimal'", 'expected "." or ","']),
-        ("[log]\ndecimal = ','", ["'decimal'", "as separator is"]),
         ("[log]\nseparator = ';'\ndecimal = ','\nthousands = ','", ["'thousands'", "as decimal is"]),
         ("[log]\nencoding = 'latin9000'", ["'encoding'", "cp1252"]),
         ("[log]\nheader = 0", ["'header'", "from 1 on"]),
@@ -70,3 +71,19 @@ def test_an_empty_table_reads_the_plain_columns(tmp_path: Path) -> None:
 
 def test_without_the_table_logs_are_plain_ones(tmp_path: Path) -> None:
     assert cart(tmp_path, "").dialect is None
+
+
+LOGS = (Path(__file__).parents[4] / "docs" / "logs.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"^```toml\n(\[log\].*?)^```", LOGS, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("table", EXAMPLES)
+def test_the_tables_of_the_page_are_tables(table: str, tmp_path: Path) -> None:
+    assert cart(tmp_path, table).dialect is not None
+
+
+def test_the_page_has_every_key() -> None:
+    assert not [
+        key for key in ALL_KEYS if f"`{key}`" not in LOGS and f"`{key} = " not in LOGS and f"[log.{key}" not in LOGS
+    ]
+    assert EXAMPLES

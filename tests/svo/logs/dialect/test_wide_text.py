@@ -12,6 +12,27 @@ from svo import detect
 from svo.logs.dialect.read import Reading
 from tests.svo.logs.dialect.carts import cart, written
 
+MILLI = """[log]
+separator = ";"
+time = { column = "t" }
+[log.columns]
+force = { column = "f", unit = "mN" }
+position = { column = "p", unit = "mm" }
+"""
+PAIRS = """[log]
+separator = "\\t"
+[log.columns]
+force = { column = "f", time = { column = "t1" } }
+position = { column = "p", time = { column = 3 } }
+"""
+NIGHT = """[log]
+separator = " "
+exponent = "D"
+time = { column = ["d", "n"], format = "%Y%m%d %H%M%S.%f" }
+[log.columns]
+force = { column = "f" }
+position = { column = "p" }
+"""
 PLAIN = '[log]\ntime = { column = "t" }\n[log.columns]\nforce = { column = "f" }\nposition = { column = "p" }\n'
 
 
@@ -44,6 +65,10 @@ def positions(found: Reading) -> list[float]:
         ('"t","f","p"\n"0","1","2"\n"0.1","1","3"\n', PLAIN),
         ("t, f, p\r\n0, 1, 2\r\n\r\n0.1, 1, 3\r\n,,\r\n", PLAIN),
         ("t,f,p\r0,1,2\r0.1,1,3\r", PLAIN),
+        ('t,f,p\n"0","1,0","2,0"\n"0,1","1","3"\n', stated('decimal = ","')),
+        ("t;f;p\n0;1000 mN;2000mm\n0.1;1000mN;3000 mm\n", MILLI),
+        ("t1\tf\tt2\tp\n0\t1\t0\t2\n0.1\t1\t0.1\t3\n\t\t0.15\t\n", PAIRS),
+        ("d n f p\n20250314 235959.95 1.0D0 2\n20250315 000000.05 1 3\n", NIGHT),
         ("# made by hand\nt,f,p\n0,1,2\n% a remark\n0.1,1,3\n", stated('skip = ["^[#%]"]')),
         ("x\nA, B\n\nt,f,p\ns,N,m\n0,1,2\n0.1,1,3\n", stated("header = 4", "first_row = 6")),
         ("t,f,p\ns,N,m\n0,1,2\n0.1,1,3\n", stated("first_row = 3")),
