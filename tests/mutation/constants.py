@@ -114,6 +114,7 @@ CONSTANTS = (
     Constant("polytopes.preimage", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("core/polytopes/centre.c", "EPS", "outward", ROUNDED),
     Constant("svo.logs.columns", "TIME_TOLERANCE", "tolerance", "tests/svo/logs/test_log_file.py"),
+    Constant("svo.isolation.containment", "_ROUNDING", "tolerance", "tests/svo/isolation/test_bank_of_kind_one.py"),
     Constant(
         "svo.analysis.model_pair", "LEAST_SEPARATION", "tolerance", "tests/svo/analysis/test_distinguishability.py"
     ),

@@ -100,6 +100,12 @@ def in_units(model: UncertainModel, unit: float) -> UncertainModel:
     return model.replace(**scaled(model), uncertainties=others)
 
 
+@pytest.mark.parametrize(("off", "refused"), [(1e-7, True), (1e-11, False)])
+def test_a_difference_beyond_rounding_is_one(off: float, refused: bool) -> None:
+    nominal = CART.replace(uncertainties=[])
+    assert excludes(nominal.replace(B=[[0.0], [0.1 * (1.0 + off)]]), nominal) is refused
+
+
 def test_random_models_that_contain_the_nominal_plant_are_never_refused() -> None:
     """60 models, seed 0: the nominal one is a member of the fault's, in its middle, at a corner, or anywhere."""
     rng = np.random.default_rng(0)
