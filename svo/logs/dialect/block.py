@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from decimal import Decimal
 
 import numpy as np
@@ -12,9 +11,10 @@ import numpy as np
 from svo.logs.dialect.numbers import Marks
 from svo.logs.dialect.rules import Times, Which
 from svo.logs.dialect.source import Source
-from svo.logs.dialect.stamps import PICO, UNITS, Stamps, counted, picoseconds_of, seconds, stamps_of
+from svo.logs.dialect.stamps import UNITS, Stamps, counted, seconds, stamps_of, stamps_of_rows
 
-_DAY, _SUMMER = 86400.0, 3600.0
+_DAY = 86400.0
+SUMMER = (3600.0, 1800.0)  # by which clocks are changed; half an hour on Lord Howe Island
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,12 @@ class Block:
         return replace(self, rows=[self.rows[i] for i in chosen], time=[self.time[i] for i in chosen])
 
 
-def block_of(source: Source, rows: list[int], rule: Times, marks: Marks, used: Sequence[Which]) -> Block:
+def block_of(
+    source: Source, rows: list[int], rule: Times, marks: Marks, used: Sequence[Which], *, in_order: bool = True
+) -> Block:
     """Rows with the stamps that a rule gives them; rows that hold neither time nor a reading of ``used`` are left out.
+
+    Local stamps of the hour that comes twice need rows ``in_order`` of time.
 
     Raises
     ------
@@ -63,11 +67,9 @@ def block_of(source: Source, rows: list[int], rule: Times, marks: Marks, used: S
         Naming the line and the column.
     """
     if rule.step is not None:
-        first, step = picoseconds_of(rule.start or 0.0), Decimal(repr(rule.step)) * PICO
-        time = [first + round(k * step) for k in range(len(rows))]
-        date = rule.start if isinstance(rule.start, datetime) else None
-        local = date is not None and date.tzinfo is None and rule.zone is None
-        return Block(source, rows, time, date is not None, local, "start and step", (), rule.columns)
+        called = "start and step"
+        stamps = stamps_of_rows(len(rows), lambda _: f"{source.source}, start of [log.time]", rule)
+        return Block(source, rows, stamps.picoseconds, stamps.is_date, stamps.is_local, called, stamps.notes, ())
     columns = [source.column(which) for which in rule.columns]
     for which, column in zip(rule.columns, columns, strict=True):
         other = next((value for value in used if source.size(value) != len(column)), None)
@@ -78,17 +80,23 @@ def block_of(source: Source, rows: list[int], rule: Times, marks: Marks, used: S
             )
     called = " and ".join(source.label(which) for which in rule.columns)
     if len(columns) == 1 and isinstance(columns[0], np.ndarray):
-        stamps = _of_numbers(source, columns[0], rows, rule, called)
+        stamps = _of_numbers(source, columns[0], rows, rule, called, in_order)
     else:
         values = [source.column(which) for which in used]
         texts = {row: " ".join(str(column[row]) for column in columns).strip() for row in rows}
         rows = [row for row in rows if texts[row] or any(str(column[row]) for column in values)]
         cells = [texts[row] for row in rows]
-        stamps = stamps_of(cells, lambda i: f"{source.source}, {source.place(rows[i])}, {called}", rule, marks)
+
+        def where(i: int) -> str:
+            return f"{source.source}, {source.place(rows[i])}, {called}"
+
+        stamps = stamps_of(cells, where, rule, marks, in_order=in_order)
     return Block(source, rows, stamps.picoseconds, stamps.is_date, stamps.is_local, called, stamps.notes, rule.columns)
 
 
-def _of_numbers(source: Source, values: np.ndarray, rows: Sequence[int], rule: Times, called: str) -> Stamps:
+def _of_numbers(
+    source: Source, values: np.ndarray, rows: Sequence[int], rule: Times, called: str, in_order: bool
+) -> Stamps:
     if rule.format is not None:
         raise ValueError(
             f"{source.source}, {called} holds numbers, and [log.time] states a format of texts; state unit"
@@ -99,7 +107,7 @@ def _of_numbers(source: Source, values: np.ndarray, rows: Sequence[int], rule: T
         raise ValueError(f"{source.source}, {source.place(rows[bad[0]])}, {called}: {taken[bad[0]]} is no time")
     factor, unit = Decimal(repr(rule.scale)), UNITS[rule.unit or "s"]
     time = [round(Decimal(repr(value)) * factor * unit) for value in taken.tolist()]
-    return counted(time, lambda i: f"{source.source}, {source.place(rows[i])}, {called}", rule)
+    return counted(time, lambda i: f"{source.source}, {source.place(rows[i])}, {called}", rule, in_order=in_order)
 
 
 def ordered(block: Block, *, part: int | None, sort: bool) -> Block:
@@ -148,7 +156,7 @@ def _goes_back(block: Block, back: Sequence[int], counts: Sequence[int]) -> Valu
         return ValueError(f"{found}, and at {len(back) - 1} places more; state in [log] {sort}")
     sizes = f"{', '.join(map(str, counts[:-1]))} and {counts[-1]}"
     parts = f"{len(counts)} recordings, of {sizes} samples? The time between is not in the file: state part"
-    if len(back) == 1 and block.is_local and _SUMMER / 2 < step <= _SUMMER:
+    if len(back) == 1 and block.is_local and any(0.5 * by < step <= by for by in SUMMER):
         return ValueError(
             f"{found}; the end of summer time (state zone in [log.time]), or a restart, {parts} in [log] (or {sort})"
         )

@@ -20,7 +20,7 @@ from svo.logs.dialect.rules import Channel, Dialect, Times, Which
 from svo.logs.dialect.series import Series, series_of
 from svo.logs.dialect.source import Source
 from svo.logs.dialect.stamps import moment, seconds
-from svo.logs.dialect.values import values_of
+from svo.logs.dialect.values import good_rows, in_model_units, values_of
 from svo.logs.names import Column, Columns
 
 
@@ -96,7 +96,12 @@ class Channels:
         """
         rule, which = self.rule(column.name), self.which(column.name)
         block = self._block(self._key(column.name))
+        try:
+            in_model_units(rule, column.unit)
+        except ValueError as error:
+            raise ValueError(f"{self._path}, unit in [log.columns.{column.name}]: {error}") from error
         values = values_of(block, which, self._dialect, rule, column.unit)
+        self._check_flag(column.name, block)
         series = series_of(column.name, block.source.label(which), block, values, self._dialect.duplicates)
         if series.repeats:
             counts = self._dialect.duplicates
@@ -107,6 +112,18 @@ class Channels:
         if not self.is_input(column.name):
             self.notes += notes_of(series, rule, column.unit)
         return series if rule.held is None else without_repeats(series, rule.held)
+
+    def _check_flag(self, name: str, block: Block) -> None:
+        """Note a flag that never is what is stated to be good."""
+        valid = self.rule(name).valid or self._dialect.valid
+        if valid is None or not block.rows or good_rows(block, valid).any():
+            return
+        flags = block.source.column(valid.column)
+        there = ", ".join(repr(flag) for flag in sorted({str(flags[row]) for row in block.rows})[:10])
+        self.notes.append(
+            f"{name}: {block.source.label(valid.column)} never is {' or '.join(valid.good)}, so no reading counts; it "
+            f"is {there}"
+        )
 
     def check_clocks(self, series: Mapping[str, Series], Ts: float) -> None:
         """Raise a ValueError if files begin at times that differ by more than a step: they may be of other clocks."""
@@ -175,7 +192,8 @@ class Channels:
             if key.tag is not None:
                 rows = self._tagged(source, key.tag)
             used = [self.which(column.name) for column in self.all if self._key(column.name) == key]
-            block = block_of(source, rows, key.time, marks_of(self._dialect), used)
+            in_order = not self._dialect.sort
+            block = block_of(source, rows, key.time, marks_of(self._dialect), used, in_order=in_order)
             self.notes += [note for note in block.notes if note not in self.notes]
             self._blocks[key] = ordered(block, part=self._dialect.part, sort=self._dialect.sort)
         return self._blocks[key]

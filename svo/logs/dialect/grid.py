@@ -7,6 +7,7 @@ of its rate times the time moved, by which its noise is wider; without such a bo
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,14 +77,19 @@ def _check_span(one: Series, time: Array, Ts: float) -> None:
         )
 
 
-def check_unit(anchor: Series, Ts: float, rule: Times) -> None:
-    """Raise a ValueError if the steps of a channel are the sampling time in another unit than the stated one."""
+def check_unit(anchor: Series, Ts: float, rule: Times, every: int = 1) -> None:
+    """Raise a ValueError if the steps of a channel are the sampling time in another unit than the stated one.
+
+    One of ``every`` so many readings is on the grid.
+    """
     steps = np.diff(anchor.time(anchor.stamp(0)))
     if not steps.size:
         return
     step = float(np.median(steps))
-    if _fits(step, Ts):
+    if _fits(step, Ts) or _fits(step * every, Ts):
         return
+    if rule.format == "duration" and _fits(60 * step, Ts):
+        _check_hours(anchor, rule)
     if rule.format is not None or rule.step is not None:
         return  # the unit is not in question
     stated = rule.unit or "s"
@@ -99,6 +105,16 @@ def check_unit(anchor: Series, Ts: float, rule: Times) -> None:
         raise ValueError(
             f"{anchor.block.source.source}, {anchor.block.called}: the median step is {raw:.6g}, read as "
             f"{stated}; the sampling time is {Ts:g} s. It fits {' or '.join(fits[:2])} in [log.time]"
+        )
+
+
+def _check_hours(anchor: Series, rule: Times) -> None:
+    """10:15 is read as minutes and seconds; raise a ValueError if hours and minutes would fit."""
+    text = str(anchor.block.source.column(rule.columns[0])[anchor.block.rows[0]])
+    if re.fullmatch(r"\d{1,2}:\d\d", text):
+        raise ValueError(
+            f"{anchor.place(0)}: {text!r} is read as minutes and seconds; as hours and minutes its steps are the "
+            'sampling time: state format = "%H:%M" in [log.time]'
         )
 
 

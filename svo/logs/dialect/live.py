@@ -13,7 +13,7 @@ from svo.checks import Array
 from svo.logs.dialect.block import Block
 from svo.logs.dialect.numbers import marks_of
 from svo.logs.dialect.rules import Channel, Dialect, Times
-from svo.logs.dialect.sheet import Sheet
+from svo.logs.dialect.sheet import Sheet, fitted
 from svo.logs.dialect.stamps import seconds, stamps_of
 from svo.logs.dialect.values import in_model_units, values_of
 from svo.logs.names import Column, Columns
@@ -144,10 +144,7 @@ class LiveParser:
         return [time, *values]
 
     def _block(self, line: int, row: Sequence[str]) -> Block:
-        width = len(self._names)
-        if any(row[width:]):
-            raise ValueError(f"{self._source}, line {line}: {len(row)} cells; expected {width}, one a name")
-        cells = [*row[:width], *[""] * (width - len(row))]
+        cells = fitted(self._source, line, list(row), self._names, self._dialect.separator)
         sheet = Sheet(self._source, self._names, [cells], [line])
         return Block(sheet, [0], [0], False, False, "", (), self._times.columns)
 

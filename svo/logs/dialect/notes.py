@@ -13,6 +13,7 @@ from svo.logs.dialect.values import in_model_units
 
 _ENOUGH = 10  # readings, below which nothing is said of their kind
 _FAR = 2.0  # times the range of all others
+_NAME = re.compile(r"""column (?:\d+ \()?['"](.*)['"]\)?""")
 _UNIT = re.compile(r"\[([^\]]+)\]|\(([^)]+)\)\s*$")
 
 
@@ -56,7 +57,8 @@ def _has_runs(equal: Array) -> bool:
 
 
 def _unit(series: Series, rule: Channel, unit: str) -> str:
-    found = _UNIT.search(series.label.strip("'"))
+    name = _NAME.fullmatch(series.label)
+    found = _UNIT.search(name[1]) if name else None
     if not found or rule.unit is not None or rule.scale != 1:
         return ""
     written = found[1] or found[2]

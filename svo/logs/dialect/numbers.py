@@ -70,8 +70,8 @@ def numbers_of(cells: Sequence[str], where: Callable[[int], str], dialect: Diale
         For text in a number's place that is not stated to be missing.
     """
     missing = {"", *dialect.missing, *channel.missing}
-    sentinels = {*dialect.sentinels, *channel.sentinels}
     number = _reader(dialect, channel)
+    sentinels = {*_sentinels(dialect, channel), *map(number, missing)}  # -999 is missing however it is written
     values = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):
         if cell in missing:
@@ -83,6 +83,13 @@ def numbers_of(cells: Sequence[str], where: Callable[[int], str], dialect: Diale
         elif value not in sentinels:
             values[i] = value
     return values
+
+
+def _sentinels(dialect: Dialect, channel: Channel) -> set[float]:
+    """Numbers that mean no reading; in two's complement 0x8000 of 16 bits is -32768."""
+    stated = {*dialect.sentinels, *channel.sentinels}
+    bits = HEXADECIMAL.get(channel.number or "hex")
+    return stated | {value - 2.0**bits for value in stated if value >= 2.0 ** (bits - 1)} if bits else stated
 
 
 def _reader(dialect: Dialect, channel: Channel) -> Callable[[str], float | None]:

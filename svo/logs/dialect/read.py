@@ -11,6 +11,7 @@ import numpy as np
 
 from svo.checks import Array
 from svo.logs.columns import TIME_TOLERANCE, LogNote
+from svo.logs.dialect.block import SUMMER
 from svo.logs.dialect.channels import Channels, when
 from svo.logs.dialect.grid import Placed, check_unit, grid_of, most_samples, place_input, place_output
 from svo.logs.dialect.rules import Dialect
@@ -85,7 +86,8 @@ class _Placing:
         self._notes = channels.notes
         for name, one in series.items():
             if channels.is_input(name) and not one.values.size:
-                raise ValueError(f"{path}, {one.label}: no row has a reading of {name}; an input must be known")
+                rows = "" if one.block.rows else " (there are no rows behind the names)"
+                raise ValueError(f"{path}, {one.label}: no row has a reading of {name}{rows}; an input must be known")
         measured = [one for one in series.values() if one.values.size]
         if not measured:
             raise ValueError(f"{path}: no row has a reading of {' or '.join(series)}")
@@ -94,7 +96,8 @@ class _Placing:
 
     def reading(self) -> Reading:
         anchor = self._anchor
-        check_unit(anchor, self._Ts, self._channels.times(anchor.name))
+        every = self._channels.rule(anchor.name).every
+        check_unit(anchor, self._Ts, self._channels.times(anchor.name), every)
         self._channels.check_clocks(self._series, self._Ts)
         grid = self._extended(grid_of(anchor, self._Ts))
         placed = {name: self._place(one, grid) for name, one in self._series.items()}
@@ -180,6 +183,8 @@ class _Placing:
             flag = self._channels.flag(one.name, one.block, row)
             what = f"the cell is {str(cell)!r:.60}{flag}"
         more = f" (and at {count - 1} samples more)" if count > 1 else ""
+        if one.block.is_local and any(abs(count * self._Ts - by) < 2 * self._Ts for by in SUMMER):
+            what += "; does the clock go forward there? Then state zone in [log.time]"
         return ValueError(
             f"{where}: input {one.name} has no reading at {time:.9g} s{more}: {what}. An input must be known: state "
             f'missing = "hold" in [log.columns.{one.name}] if it stays what it was'

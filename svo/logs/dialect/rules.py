@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+
+_DAY = re.compile("%[dmbBjxcyYG]")
 
 Which = str | int
 """A column by its name, or by its number from 1 on."""
@@ -61,6 +64,15 @@ class Times:
     epoch: datetime | None = None
     zone: str | None = None
     one_clock: bool = False
+
+    @property
+    def is_date(self) -> bool:
+        """Whether stamps say the day, so that a zone has a meaning."""
+        if self.step is not None:
+            return isinstance(self.start, datetime)
+        if self.format is None:
+            return self.epoch is not None
+        return self.format == "iso" or _DAY.search(self.format) is not None
 
 
 @dataclass(frozen=True)
@@ -167,6 +179,12 @@ class Dialect:
     sort: bool = False
     part: int | None = None
     stated: str = ""
+
+    @property
+    def counts_rows(self) -> bool:
+        """Whether the place of a row is its time, so that a row of empty cells is a sample too."""
+        times = (self.time, *(channel.time for channel in self.channels.values()))
+        return any(time is not None and time.step is not None for time in times)
 
     def channel(self, name: str) -> Channel:
         """How the input or output of that name is read."""

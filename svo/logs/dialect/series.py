@@ -101,7 +101,7 @@ def _conflict(name: str, label: str, block: Block, values: Array, group: NDArray
     ends = f"{values[group[0]]:g} and {values[group[-1]]:g}"
     several = f"{len(group)} readings of {name} share {when} ({ends} among them)"
     finer = _finer(block, len(set(block.time)))
-    if _is_whole(block.time) and len(group) > 2:
+    if block.columns and _is_whole(block.time) and len(group) > 2:
         rows = _rows_of(block, int(group[0]))
         several += f", as {rows} rows do: the resolution of {block.called} is 1 s" + (
             f", {finer} has more" if finer else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -75,7 +75,7 @@ class Sheet:
             if not 1 <= which <= len(self.names):
                 raise ValueError(f"{self.source} has no column {which}; expected a number from 1 to {len(self.names)}")
             return which - 1
-        found = [i for i, name in enumerate(self.names) if name == which.strip()]
+        found = [i for i, name in enumerate(self.names) if name == _one_line(which)]
         if not found:
             raise ValueError(f"{self.source} has no column {which!r}; {self._others(which)}")
         if len(found) > 1:
@@ -105,22 +105,25 @@ def read_sheet(path: Path, dialect: Dialect) -> Sheet:
     if lines and not whole:
         notes.append(_no_end(len(lines)))
         lines = lines[:-1] if len(lines) > 1 else lines
-    feed = _Feed(lines, dialect)
-    rows = _rows(str(path), feed, dialect)
-    names = _names(str(path), lines, dialect, rows)
+    names, behind, skipped = _names(str(path), lines, dialect)
+    feed = _Feed(lines, max(behind, dialect.first_row or 0), dialect)
+    feed.keeps_blank = dialect.counts_rows and len(names) == 1
     found, numbers, again = [], [], []
-    for line, row in rows:
+    names_cut = _ends_cut(names)
+    for line, row in _rows(str(path), feed, dialect):
         cells = [cell.strip() for cell in row]
-        if not any(cells) or line < (dialect.first_row or 0):
+        if not any(cells) and not dialect.counts_rows:
             continue
-        if cells[0] == names[0] and _ends_cut(cells) == _ends_cut(names):
+        if any(cells) and _one_line(cells[0]) == names[0] and _ends_cut([*map(_one_line, cells)]) == names_cut:
             again.append(line)
             continue
-        found.append(_fitted(str(path), line, cells, names))
+        found.append(fitted(str(path), line, cells, names, dialect.separator))
         numbers.append(line)
+    while found and not any(found[-1]):  # nothing tells empty rows at the end from samples
+        del found[-1], numbers[-1]
     notes += _promised(lines, dialect, len(found))
-    if feed.skipped:
-        notes.append(f"{feed.skipped} lines are skipped, as [log] states")
+    if skipped + feed.skipped:
+        notes.append(f"{skipped + feed.skipped} lines are skipped, as [log] states")
     if again:
         notes.append(f"the names stand again in line{'s' * (len(again) > 1)} {', '.join(map(str, again[:5]))}")
     return Sheet(str(path), names, found, numbers, tuple(again), tuple(notes))
@@ -142,53 +145,52 @@ def _no_end(line: int) -> str:
     )
 
 
-def _names(
-    source: str, lines: Sequence[str], dialect: Dialect, rows: Iterator[tuple[int, list[str]]]
-) -> tuple[str, ...]:
+def _names(source: str, lines: Sequence[str], dialect: Dialect) -> tuple[tuple[str, ...], int, int]:
+    """The names, the line behind them (they may stand in several), and how many lines were skipped before them."""
     if dialect.names:
-        return tuple(name.strip() for name in dialect.names)
+        return tuple(map(_one_line, dialect.names)), 1, 0
     if dialect.header is None:
-        first = next(rows, None)
-        if first is None:
-            raise ValueError(f"{source} is empty; expected a line with the names of the columns and one row a sample")
-        return tuple(cell.strip() for cell in first[1])
-    if len(lines) < dialect.header:
+        feed = _Feed(lines, 1, dialect)
+    elif len(lines) < dialect.header:
         raise ValueError(
             f"{source} ends at line {len(lines)}; expected the names of the columns in line {dialect.header}, as "
             "header of [log] states"
         )
-    alone = _Feed([lines[dialect.header - 1]], Dialect(separator=dialect.separator))
-    row = next(_rows(f"{source}, header", alone, dialect), None)
-    if row is None:
+    elif not lines[dialect.header - 1].strip():
         raise ValueError(f"{source}, line {dialect.header}: the line is blank; expected the names of the columns")
-    return tuple(cell.strip() for cell in row[1])
+    else:
+        feed = _Feed(lines, dialect.header, replace(dialect, skip=()))
+    row = next(_rows(source, feed, dialect), None)
+    if row is None:
+        raise ValueError(f"{source} is empty; expected a line with the names of the columns and one row a sample")
+    return tuple(map(_one_line, row[1])), feed.last + 1, feed.skipped
 
 
 class _Feed:
-    """Hands the lines of data to the reader of cells, and knows where the row that it makes begins."""
+    """Hands lines to the reader of cells, and knows where the row that it makes begins and ends."""
 
-    def __init__(self, lines: Sequence[str], dialect: Dialect) -> None:
-        self._lines = lines
+    def __init__(self, lines: Sequence[str], first: int, dialect: Dialect) -> None:
+        self._lines, self._first = lines, first
         self._skip = [re.compile(pattern) for pattern in dialect.skip]
-        self._first = dialect.first_row or (dialect.header or 0) + 1
-        if dialect.header is None and not dialect.names:
-            self._first = 1
         self._separator, self._blanks = dialect.separator, dialect.separator == " "
         self.begin: int | None = None
+        self.last = 0
         self.skipped = 0
+        self.keeps_blank = False
 
     def __iter__(self) -> Iterator[str]:
         for number, line in enumerate(self._lines[self._first - 1 :], start=self._first):
+            self.last = number
             if number == 1 and line.strip() == f"sep={self._separator}":
                 continue  # a spreadsheet's word on what is stated
             if any(pattern.search(line) for pattern in self._skip):
                 self.skipped += 1
                 continue
             if self.begin is None:
-                if not line.strip():
+                if not line.strip() and not self.keeps_blank:
                     continue
                 self.begin = number
-            yield " ".join(line.split()) if self._blanks else line
+            yield (" ".join(line.split()) if self._blanks else line) + "\n"
 
 
 def _rows(source: str, feed: _Feed, dialect: Dialect) -> Iterator[tuple[int, list[str]]]:
@@ -206,8 +208,13 @@ def _rows(source: str, feed: _Feed, dialect: Dialect) -> Iterator[tuple[int, lis
             ) from error
         if row is None:
             return
-        if row:
+        if row or feed.keeps_blank:
             yield feed.begin or 0, row
+
+
+def _one_line(name: str) -> str:
+    """A name with single blanks, also where it is broken into lines."""
+    return " ".join(name.split())
 
 
 def _ends_cut(cells: Sequence[str]) -> list[str]:
@@ -216,8 +223,20 @@ def _ends_cut(cells: Sequence[str]) -> list[str]:
     return list(cells[: last + 1])
 
 
-def _fitted(source: str, line: int, cells: list[str], names: Sequence[str]) -> list[str]:
-    """As many cells as there are names: a short row is padded, and what is too much must be empty."""
+def fitted(source: str, line: int, cells: list[str], names: Sequence[str], separator: str) -> list[str]:
+    """As many cells as there are names: a short row is padded, and what is too much must be empty.
+
+    Raises
+    ------
+    ValueError
+        If cells are too many; or too few, and between blanks, where nothing shows which of them is empty.
+    """
+    if separator == " " and any(cells) and len(cells) < len(names):
+        raise ValueError(
+            f"{source}, line {line}: {len(cells)} cells, but {len(names)} names of columns, and between blanks nothing "
+            "shows which cell is empty; state names in [log] if the line of the names has more words than columns, or "
+            "skip if the line is no row"
+        )
     if len(cells) == len(names):
         return cells
     extra = [cell for cell in cells[len(names) :] if cell]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal
 from functools import lru_cache
@@ -28,9 +28,11 @@ UNITS = {
 
 _LONGEST = PICO * 10**18
 _EPOCH = datetime(1970, 1, 1)
+_NO_DAY = datetime(1900, 1, 1)  # that strptime takes where a format has none
 _FRACTION = re.compile(r"(?<=\d)[.,](\d+)(?=\s*(?:[A-Za-z+-].*)?$)")
 _CLOCK = re.compile(
-    r"(?P<sign>-)?(?:(?P<days>\d+)(?: days? |\.|d ?))?(?:(?P<h>\d+):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d+)?)"
+    r"(?P<sign>[+-])?(?:(?P<days>\d+)(?: days?,? |\.|d ?))?"
+    r"(?:(?P<h>\d+):(?P<m>[0-5]?\d)|(?P<minutes>\d{1,2})):(?P<s>[0-5]?\d(?:[.,]\d+)?)(?P<ms>(?<=:\d\d):\d{3})?"
 )
 _NAMED = {
     "ns": "ns", "us": "us", "µs": "us", "μs": "us", "ms": "ms", "msec": "ms", "s": "s", "sec": "s", "secs": "s",
@@ -61,8 +63,8 @@ class Stamps:
     notes: tuple[str, ...] = ()
 
 
-def stamps_of(cells: Sequence[str], where: Where, rule: Times, marks: Marks) -> Stamps:
-    """The times in cells; ``where`` says where one stands.
+def stamps_of(cells: Sequence[str], where: Where, rule: Times, marks: Marks, *, in_order: bool = True) -> Stamps:
+    """The times in cells; ``where`` says where one stands, and ``in_order`` whether rows are in order of time.
 
     Raises
     ------
@@ -70,25 +72,42 @@ def stamps_of(cells: Sequence[str], where: Where, rule: Times, marks: Marks) -> 
         For a cell that is none by the rule, with the key to state.
     """
     if rule.format is None:
-        return counted([_counted(cell, where, i, rule, marks) for i, cell in enumerate(cells)], where, rule)
+        numbers = [_counted(cell, where, i, rule, marks) for i, cell in enumerate(cells)]
+        return counted(numbers, where, rule, in_order=in_order)
     if rule.format == "duration":
         expected = "a duration such as 0:01:02.5 or 0.1 sec"
         return Stamps([_read(cell, where, i, _duration, expected) for i, cell in enumerate(cells)])
     iso = rule.format == "iso"
     read, expected = (_iso, "an ISO 8601 date") if iso else (_by_format(rule.format), repr(rule.format))
-    return _dated([_read(cell, where, i, read, expected) for i, cell in enumerate(cells)], where, rule.zone)
+    dates = [_read(cell, where, i, read, expected) for i, cell in enumerate(cells)]
+    if not rule.is_date:  # a clock without a day counts from midnight
+        return Stamps([_since(_NO_DAY, date.replace(tzinfo=None), rest) for date, rest in dates])
+    return _dated(dates, where, rule.zone, in_order)
 
 
-def counted(picoseconds: list[int], where: Where, rule: Times) -> Stamps:
+def stamps_of_rows(count: int, where: Where, rule: Times) -> Stamps:
+    """Times of rows from the stated start and step."""
+    step = Decimal(repr(rule.step)) * PICO
+    if isinstance(rule.start, datetime):
+        first = _dated([(rule.start, 0)], where, rule.zone, True)
+    else:
+        first = Stamps([round(Decimal(repr(rule.start or 0.0)) * PICO)])
+    return replace(first, picoseconds=[first.picoseconds[0] + round(k * step) for k in range(count)])
+
+
+def counted(picoseconds: list[int], where: Where, rule: Times, *, in_order: bool = True) -> Stamps:
     """Times that count from an epoch, or from something unknown."""
     if rule.epoch is None:
+        if rule.zone is not None and picoseconds:
+            raise ValueError(f"{where(0)}: a number, and zone is for dates; state epoch in [log.time], or drop zone")
         return Stamps(picoseconds)
-    first = picoseconds_of(rule.epoch)
+    epoch = rule.epoch if rule.epoch.tzinfo is None else rule.epoch.astimezone(UTC).replace(tzinfo=None)
+    first = _since(_EPOCH, epoch, 0)
     found = [first + stamp for stamp in picoseconds]
     if rule.zone is None:
         return Stamps(found, is_date=True)
     # Whole microseconds are a date; what is left of a stamp is carried along.
-    return _dated([_date(stamp, where, i) for i, stamp in enumerate(found)], where, rule.zone)
+    return _dated([_date(stamp, where, i) for i, stamp in enumerate(found)], where, rule.zone, in_order)
 
 
 def _date(stamp: int, where: Where, i: int) -> tuple[datetime, int]:
@@ -107,14 +126,6 @@ def moment(picoseconds: int) -> str:
     whole, rest = divmod(picoseconds, PICO)
     digits = f".{rest:012d}".rstrip("0").rstrip(".")
     return f"{_EPOCH + timedelta(seconds=whole):%Y-%m-%d %H:%M:%S}{digits}"
-
-
-def picoseconds_of(start: float | datetime) -> int:
-    """A stated time of the first row."""
-    if isinstance(start, datetime):
-        naive = start if start.tzinfo is None else start.astimezone(UTC).replace(tzinfo=None)
-        return _since_epoch(naive, 0)
-    return round(Decimal(repr(start)) * PICO)
 
 
 def _counted(cell: str, where: Where, i: int, rule: Times, marks: Marks) -> int:
@@ -147,6 +158,8 @@ def _read(cell: str, where: Where, i: int, read: Callable[[str], Read], expected
         return read(cell)
     except (ValueError, OverflowError):
         hint = "" if cell else "; state skip in [log] if the line is no row"
+        if Marks().plain(cell):
+            hint = "; a number? state unit instead of format"
         found = [text for text, _ in suggested(cell)]
         if found and expected not in (repr(text) for text in found):
             hint = "; it fits " + " or ".join(f'format = "{text}"' for text in found)
@@ -194,7 +207,7 @@ def _iso(text: str) -> tuple[datetime, int]:
     return datetime.fromisoformat(text), fraction
 
 
-def _dated(parsed: Sequence[tuple[datetime, int]], where: Where, zone: str | None) -> Stamps:
+def _dated(parsed: Sequence[tuple[datetime, int]], where: Where, zone: str | None, in_order: bool) -> Stamps:
     local = [date.tzinfo is None for date, _ in parsed]
     if any(local) and not all(local):
         k = local.index(not local[0])
@@ -203,21 +216,26 @@ def _dated(parsed: Sequence[tuple[datetime, int]], where: Where, zone: str | Non
     if not any(local):
         dates = [date.astimezone(UTC).replace(tzinfo=None) for date in dates]
     elif zone is not None:
-        dates, notes = to_utc(dates, rests, where, zone)
-    found = [_since_epoch(date, rest) for date, rest in zip(dates, rests, strict=True)]
+        dates, notes = to_utc(dates, rests, where, zone, in_order)
+    found = [_since(_EPOCH, date, rest) for date, rest in zip(dates, rests, strict=True)]
     return Stamps(found, True, any(local) and zone is None, tuple(notes))
 
 
-def _since_epoch(date: datetime, rest: int) -> int:
-    since = date - _EPOCH
+def _since(begin: datetime, date: datetime, rest: int) -> int:
+    since = date - begin
     return ((since.days * 86400 + since.seconds) * 10**6 + since.microseconds) * 10**6 + rest
 
 
 def _duration(text: str) -> int:
     if found := _CLOCK.fullmatch(text):
-        parts = (found["days"], 86400), (found["h"], 3600), (found["m"], 60), (found["s"], 1)
+        if found["ms"] and not found["h"]:
+            raise ValueError(text)  # of three parts the last may be seconds
+        parts = (
+            (found["days"], 86400), (found["h"], 3600), (found["m"] or found["minutes"], 60), (found["s"], 1),
+            ((found["ms"] or "")[1:], Decimal("0.001")),
+        )  # fmt: skip
         total = sum((_decimal(part) * factor for part, factor in parts if part), Decimal(0))
-        return round((-total if found["sign"] else total) * PICO)
+        return round((-total if found["sign"] == "-" else total) * PICO)
     if text.startswith("P") and (found := _ISO.fullmatch(text)) and any(found.groups()):
         amounts = zip(found.groups(), (86400, 3600, 60, 1), strict=True)
         return round(sum((_decimal(part) * factor for part, factor in amounts if part), Decimal(0)) * PICO)

@@ -25,6 +25,11 @@ def conversion(source: str, target: str) -> tuple[float, float]:
         return 1.0, 0.0
     registry = _registry()
     known = [_unit(registry, text) for text in (source, target)]
+    if _angles(registry, known[0]) != _angles(registry, known[1]) and known[0].is_compatible_with(known[1]):
+        raise ValueError(
+            f"{source!r} and the model's {target!r} differ by an angle, which pint takes as a bare number: 1 Hz as 1 "
+            "rad/s. State unit rpm or turn/s if turns are counted, or scale without unit"
+        )
     try:
         zero, one, two = (float(registry.Quantity(x, known[0]).to(known[1]).magnitude) for x in (0.0, 1.0, 2.0))
     except Exception as error:
@@ -33,6 +38,11 @@ def conversion(source: str, target: str) -> tuple[float, float]:
         raise ValueError(f"{source!r} is no multiple of the model's {target!r}; convert the column, and drop unit")
     factor = registry.Quantity(1.0, known[0]).m_as(known[1]) if zero == 0 else one - zero
     return float(factor), zero
+
+
+def _angles(registry: Any, unit: Any) -> float:
+    """The power of an angle in a unit."""
+    return float(dict(registry.get_root_units(unit, check_nonmult=False)[1]._units).get("radian", 0))
 
 
 def _unit(registry: Any, text: str) -> Any:

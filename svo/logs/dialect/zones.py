@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 
 
 def to_utc(
-    dates: Sequence[datetime], rests: Sequence[int], where: Callable[[int], str], zone: str
+    dates: Sequence[datetime], rests: Sequence[int], where: Callable[[int], str], zone: str, in_order: bool = True
 ) -> tuple[list[datetime], list[str]]:
     """Dates of UTC (without a zone), and notes, from local ones in the order of their rows.
 
@@ -24,14 +24,22 @@ def to_utc(
         Says where a date stands.
     zone : str
         IANA name.
+    in_order : bool
+        Rows are in order of time, which tells the two hours apart.
 
     Raises
     ------
     ValueError
-        For a local time that does not exist.
+        For a local time that does not exist, and for one that exists twice if rows are in no order.
     """
     info = ZoneInfo(zone)
     twice = [_comes_twice(date, info, where, i) for i, date in enumerate(dates)]
+    if not in_order and any(twice):
+        i = twice.index(True)
+        raise ValueError(
+            f"{where(i)}: {dates[i]} comes twice in {zone}, and rows in no order do not say which of both it is; "
+            'expected rows in order of time (no order = "sort"), or stamps of UTC'
+        )
     folds = [0] * len(dates)
     for i in range(1, len(dates)):
         if twice[i] and twice[i - 1]:

@@ -7,6 +7,7 @@ import json
 import re
 from contextlib import suppress
 from datetime import date, datetime
+from datetime import time as clock_time
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -26,6 +27,9 @@ _CHANNEL = (
     "held", "every", "rate",
 )  # fmt: skip
 ALL_KEYS = (*_LOG, *_TIME, *_CHANNEL)
+_FINEST, _LONGEST = 1e-12, 1e15  # seconds: a picosecond, thirty million years
+_NO_MARKS = tuple('"+-\r\n')
+_NUMBERS_ONLY = ("unit", "scale", "epoch")
 _OUTPUTS_ONLY = {
     "resolution": "an input is taken as exact; widen w of [model] by what it is not",
     "held": 'an input stays what it was by missing = "hold"',
@@ -68,6 +72,10 @@ def _marks(table: Table) -> dict[str, str]:
     for key, mark in found.items():
         if len(mark) != 1 and (key in table or mark):
             raise table.error(key, f"is {mark!r}; expected one character")
+        if key == "exponent" and mark and not (mark.isascii() and mark.isalpha()):
+            raise table.error(key, f"is {mark!r}; expected a letter such as D")
+        if key != "exponent" and (mark.isalnum() or mark in _NO_MARKS):
+            raise table.error(key, f"is {mark!r}; expected a mark that is no part of a name or number")
     if found["decimal"] not in (".", ","):
         raise table.error("decimal", f'is {found["decimal"]!r}; expected "." or ","')
     # A separator may be a mark of numbers too, where cells are quoted.
@@ -129,7 +137,9 @@ def _sentinels(table: Table) -> tuple[float, ...]:
 
 
 def _which(table: Table, key: str) -> Which:
-    value = table.content.get(key)
+    if key not in table:
+        raise table.error(key, "is missing; expected the name of a column, or its number from 1 on")
+    value = table.content[key]
     if isinstance(value, bool) or not isinstance(value, str | int) or value == "":
         raise table.error(key, f"is {shown(value)}; expected the name of a column, or its number from 1 on")
     if isinstance(value, int) and value < 1:
@@ -141,7 +151,7 @@ def _valid(table: Table) -> Valid | None:
     if "valid" not in table:
         return None
     inner = table.table("valid", ("column", "good"))
-    good = inner.content.get("good")
+    good = inner.content.get("good", "missing")
     if not isinstance(good, list) or not good or not all(isinstance(item, str | int | float) for item in good):
         raise inner.error("good", f"is {shown(good)}; expected what the flag is where the reading counts, such as [1]")
     return Valid(_which(inner, "column"), tuple(str(item) for item in good))
@@ -161,24 +171,54 @@ def _times(table: Table) -> Times:
         own or table.content.keys() - {"zone", "one_clock", "format", "unit", "scale", "epoch"}
     ):
         raise table.error(None, "expected either column, or start and step where no column holds the time")
-    if own and not table.number("step") > 0:
-        raise table.error("step", f"is {table.number('step'):g}; expected seconds from row to row, above 0")
-    form = table.text("format") if "format" in table else None
-    if form is not None and ("unit" in table or "scale" in table):
-        raise table.error("format", "is given and so is unit or scale, which is for numbers; drop one of both")
-    if form is not None and form not in ("iso", "duration") and "%" not in form:
-        raise table.error("format", f'is {form!r}; expected "iso", "duration", or one such as "%d.%m.%Y %H:%M:%S.%f"')
-    return Times(
+    step = table.number("step") if own else None
+    if step is not None and not _FINEST <= step < _LONGEST:
+        raise table.error("step", f"is {step:g}; expected seconds from row to row, above 0")
+    times = Times(
         columns=columns,
         start=_date_or_number(table, "start"),
-        step=table.number("step") if own else None,
-        format=form,
+        step=step,
+        format=_format(table),
         unit=table.text("unit", choices=tuple(UNITS)) if "unit" in table else None,
         scale=_positive(table, "scale", 1.0),
-        epoch=_epoch(table, form),
+        epoch=_epoch(table),
         zone=_zone(table),
         one_clock=table.truth("one_clock", False),
     )
+    _check_used(table, times)
+    return times
+
+
+def _check_used(table: Table, times: Times) -> None:
+    """No key is stated that the others leave without a meaning."""
+    if times.step is None and times.start is not None:
+        raise table.error("start", "is given and so is column, which says when each row is; drop one of both")
+    for key in _NUMBERS_ONLY:
+        if key in table and times.step is not None:
+            raise table.error(key, "is given and so is step, which is in seconds; drop it")
+        if key in table and times.format is not None:
+            raise table.error("format", f"is given and so is {key}, which is for numbers; drop one of both")
+    if times.format is not None and times.step is not None:
+        raise table.error("format", "is for a column of times, and step is given instead of one; drop it")
+    if times.zone is not None and (times.step is not None or times.format is not None) and not times.is_date:
+        raise table.error("zone", "is for dates, and these times are none; drop it, or state the day too")
+
+
+def _format(table: Table) -> str | None:
+    if "format" not in table:
+        return None
+    form = table.text("format")
+    if form in ("iso", "duration"):
+        return form
+    try:
+        if "%" not in form:
+            raise ValueError("without %")
+        datetime.strptime("", form)
+    except (ValueError, IndexError) as error:
+        if "does not match" not in str(error):
+            expected = 'expected "iso", "duration", or one such as "%d.%m.%Y %H:%M:%S.%f"'
+            raise table.error("format", f"is {form!r} ({error}); {expected}") from None
+    return form
 
 
 def _time_columns(table: Table) -> tuple[Which, ...]:
@@ -203,19 +243,20 @@ def _date_or_number(table: Table, key: str) -> float | datetime | None:
     if isinstance(value, str):
         with suppress(ValueError):
             return datetime.fromisoformat(value)
-        raise table.error(key, f"is {value!r}; expected a date such as 2025-03-14T10:15:00")
-    return table.number(key)
+    if isinstance(value, str | clock_time):
+        raise table.error(key, f"is {str(value)!r}; expected a date such as 2025-03-14T10:15:00")
+    if not abs(number := table.number(key)) < _LONGEST:
+        raise table.error(key, f"is {number:g}; expected seconds, or a date such as 2025-03-14T10:15:00")
+    return number
 
 
-def _epoch(table: Table, form: str | None) -> datetime | None:
+def _epoch(table: Table) -> datetime | None:
     """The date that numbers count from."""
     epoch = _date_or_number(table, "epoch")
     if epoch is None:
         return None
     if not isinstance(epoch, datetime):
         raise table.error("epoch", f"is {epoch:g}; expected the date that the numbers count from, such as 1970-01-01")
-    if form is not None:
-        raise table.error("epoch", "is given and so is format; it is for numbers, so drop one of both")
     return epoch
 
 
