@@ -32,7 +32,7 @@ def test_40_more_plants() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("family", "samples"), [("n20", 30), ("N200", 120)])
-def test_a_large_plant_and_a_very_long_window(family: str, samples: int) -> None:
-    """The beginning of the log of one plant of 20 states, and of one whose windows are up to 200 steps long."""
+@pytest.mark.parametrize(("family", "samples"), [("n20", 30), ("n50", 40), ("N200", 120)])
+def test_large_plants_and_a_very_long_window(family: str, samples: int) -> None:
+    """The beginning of the log of a plant of 20 states, of 50, and of one whose windows are up to 200 steps long."""
     check(family, range(1), samples, 10)
