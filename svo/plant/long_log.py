@@ -59,14 +59,12 @@ class LongLog:
             yield self.kept
             return
         self._check_unchanged()
-        samples = 0
         for portion in file.read_portions(self.path, self.plant.columns, self.plant.Ts, note=lambda _: None):
-            samples += len(portion)
             yield replace(portion, x=None)
-        self._check_unchanged(samples)
+        self._check_unchanged()
 
-    def _check_unchanged(self, samples: int | None = None) -> None:
-        if _state_of(self.path) != self._state or samples not in (None, self.samples):
+    def _check_unchanged(self) -> None:
+        if _state_of(self.path) != self._state:
             raise ValueError(
                 f"{self.path} was changed while it was read; svo watch follows a log that is still growing"
             )
