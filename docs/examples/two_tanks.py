@@ -36,11 +36,11 @@ def observer(model: NonlinearModel) -> WindowObserver:
 
 
 healthy, leaky = tanks(0.0), tanks(0.2)
-pump = np.array([[60.0 + 10.0 * np.sin(0.05 * k)] for k in range(120)])
+pump = np.array([[60.0 + 10.0 * np.sin(0.05 * k)] for k in range(90)])
 rng = np.random.default_rng(1)
 before = healthy.simulate([30.0, 12.0], pump[:61], rng)
 after = leaky.simulate(before.x[-1], pump[60:], rng)
-log = Log(2.0 * np.arange(120), pump, np.vstack([before.y[:-1], after.y]))
+log = Log(2.0 * np.arange(90), pump, np.vstack([before.y[:-1], after.y]))
 
 bank = ArchitectureI(nominal=observer(healthy), faults={"leak": observer(leaky)})
 record = bank.run(log)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -91,7 +92,7 @@ class Tape(Value):
         op_codes = np.array([recorder.slots[slot][0] for slot in order], dtype=np.int64)
         return cls(op_codes, operands, constants, np.array([place[r.slot] for r in rows], dtype=np.int64), variables)
 
-    @property
+    @cached_property
     def used(self) -> NDArray[np.bool_]:
         """Which coordinates the rows depend on (nz,)."""
         used = np.zeros(self.variables, dtype=bool)
@@ -134,13 +135,19 @@ class Tape(Value):
             If a row has no bounded range.
         """
         low, high = lower.tolist(), upper.tolist()
-        box = Box.between(low[:free], high[:free])
+        own = np.flatnonzero(self.used[:free]).tolist()  # nothing depends on the others
+        place = {j: i for i, j in enumerate(own)}
+        box = Box.between([low[j] for j in own], [high[j] for j in own])
 
         def variable(j: int) -> Form:
-            return box.coordinate(j, low[j], high[j]) if j < free else box.constant((low[j], high[j]))
+            return box.coordinate(place[j], low[j], high[j]) if j in place else box.constant((low[j], high[j]))
 
         rows = self._rows(variable, box.constant, box.applied)
-        return Forms.of(np.array(box.centre), rows)
+        g = np.zeros((len(rows), free))
+        g[:, own] = np.array([row.g for row in rows]).reshape(len(rows), len(own))
+        ends = np.array([[*row.rest, *row.range] for row in rows]).reshape(len(rows), 4).T
+        centre = 0.5 * lower[:free] + 0.5 * upper[:free]
+        return Forms(centre, np.array([row.k for row in rows], dtype=float), g, *ends.copy())
 
     def check(self, lower: Array, upper: Array) -> None:
         """Raise Unenclosed if a row has no bounded range, whatever the coordinates are whose ends are NaN."""
@@ -203,13 +210,6 @@ class Forms:
     high: Array
     lower: Array
     upper: Array
-
-    @classmethod
-    def of(cls, centre: Array, rows: Sequence[Form]) -> Forms:
-        """From one form a row."""
-        g = np.array([row.g for row in rows]).reshape(len(rows), len(centre))
-        ends = np.array([[*row.rest, *row.range] for row in rows]).reshape(len(rows), 4).T
-        return cls(centre, np.array([row.k for row in rows], dtype=float), g, *ends.copy())
 
 
 _IN_FLOATS: dict[Op, Callable[..., Any]] = {
