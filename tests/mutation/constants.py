@@ -115,6 +115,9 @@ CONSTANTS = (
     Constant("core/polytopes/centre.c", "EPS", "outward", ROUNDED),
     Constant("svo.logs.columns", "TIME_TOLERANCE", "tolerance", "tests/svo/logs/test_log_file.py"),
     Constant("svo.isolation.containment", "_ROUNDING", "tolerance", "tests/svo/isolation/test_bank_of_kind_one.py"),
+    Constant("svo.logs.dialect.grid", "_FITS", "tolerance", "tests/svo/logs/dialect/test_wide_text.py"),
+    Constant("svo.logs.dialect.grid", "_FASTER", "tolerance", "tests/svo/logs/dialect/test_wide_text.py"),
+    Constant("svo.logs.dialect.grid", "_ROUNDING", "heuristic"),
     Constant(
         "svo.analysis.model_pair", "LEAST_SEPARATION", "tolerance", "tests/svo/analysis/test_distinguishability.py"
     ),

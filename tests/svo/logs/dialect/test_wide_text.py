@@ -10,7 +10,7 @@ import pytest
 
 from svo import detect
 from svo.logs.dialect.read import Reading
-from tests.svo.logs.dialect.carts import cart, written
+from tests.svo.logs.dialect.carts import cart, reading, written
 
 MILLI = """[log]
 separator = ";"
@@ -255,6 +255,32 @@ def test_a_healthy_sine_with_jitter_raises_no_alarm(seed: int, tmp_path: Path) -
     assert found.log.widening is None
     assert any("readings are off the grid by more than 1 %" in note for note in found.notes)
     assert not detect(cart(tmp_path, table), found.log).alarms
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_moved_reading_is_as_far_off_as_its_price_says(seed: int, tmp_path: Path) -> None:
+    """Readings at any times, also several a sample, of a known signal: each is right at its sample within the price."""
+    rng = np.random.default_rng(seed)
+    phase, speed = rng.uniform(0, 6), rng.uniform(0.5, 3)
+    (tmp_path / "run").mkdir()
+    drive = "t,f\n" + "".join(f"{k / 10},1\n" for k in range(40))
+    (tmp_path / "run" / "drive.csv").write_text(drive, encoding="utf-8")
+    times = np.sort(rng.uniform(0, 3.9, rng.integers(15, 120)))
+    lines = [f"{time},{float(np.sin(speed * time + phase))}\n" for time in times.tolist()]
+    (tmp_path / "run" / "laser.csv").write_text("t,p\n" + "".join(lines), encoding="utf-8")
+    table = (
+        '[log]\ntime = { column = "t", one_clock = true }\n[log.columns]\n'
+        'force = { file = "drive.csv", column = "f" }\n'
+        f'position = {{ file = "laser.csv", column = "p", rate = {speed} }}\n'
+    )
+    log = reading(tmp_path / "run", table, tmp_path).log
+    known = ~np.isnan(log.y[:, 0])
+    off = np.abs(log.y[known, 0] - np.sin(speed * log.time[known] + phase))
+    assert log.widening is not None
+    assert known.sum() > 5
+    assert (off <= log.widening[0] + speed * 0.001 + 1e-12).all()  # 1 % of Ts costs nothing
+    nearest = np.abs(times[:, None] - log.time).min(axis=0)
+    assert log.widening[0] <= speed * nearest[known].max() + 1e-9
 
 
 def test_inputs_of_jittered_rows_are_an_error_that_says_what_to_state(tmp_path: Path) -> None:
