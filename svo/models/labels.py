@@ -75,9 +75,12 @@ class Labels(Shown):
         """
         if channels is None:
             return list(range(len(self.states))), [j for j, i in enumerate(self.reads) if i is None]
-        wanted = [channels] if isinstance(channels, str) else list(channels)
+        every = self.states + self.outputs
+        titles = [*zip(every, (*self.state_titles, *self.output_titles), strict=True)]
+        meant = {title.partition(" [")[0]: name for name, title in reversed(titles)}  # a state, where both have it
+        asked = [channels] if isinstance(channels, str) else list(channels)
+        wanted = [name if name in every else meant.get(name, name) for name in asked]
         for name in wanted:
-            every = self.states + self.outputs
             expect(name in every, "channels", name, f"any of {', '.join(every)}")
         states = [i for i, name in enumerate(self.states) if name in wanted]
         return states, [j for j, name in enumerate(self.outputs) if name in wanted and self.reads[j] not in states]
