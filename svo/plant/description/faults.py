@@ -84,16 +84,16 @@ def _fault(table: Table, kind: str, names: Mapping[str, Sequence[str]]) -> Actua
         direction = Uncertainty(**arrays)
         return PlantFault(direction=direction, **options | {"magnitude": table.number("magnitude")})
     if kind == "sensor":
-        where = _channels(table, "output", names["outputs"])
+        where = channels_of(table, "output", names["outputs"])
         return SensorFault(where, table.text("kind"), **options | {"magnitude": table.number("magnitude")})  # type: ignore[arg-type]
     if "travel" in table:
         options["travel"] = tuple(table.array("travel"))
     if "frequency_hz" in table:
         options["frequency_hz"] = table.number("frequency_hz")
-    return ActuatorFault(_channels(table, "input", names["inputs"]), table.text("kind"), **options)  # type: ignore[arg-type]
+    return ActuatorFault(channels_of(table, "input", names["inputs"]), table.text("kind"), **options)  # type: ignore[arg-type]
 
 
-def _channels(table: Table, key: str, names: Sequence[str]) -> int | tuple[int, ...]:
+def channels_of(table: Table, key: str, names: Sequence[str]) -> int | tuple[int, ...]:
     """Positions of the column or columns that a key names."""
     value = table.content.get(key)
     chosen = [value] if isinstance(value, str) else value

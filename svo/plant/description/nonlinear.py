@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from svo.models.nonlinear import NonlinearModel
-from svo.plant.description.faults import FaultModel, check_name
+from svo.plant.description.faults import FaultModel, channels_of, check_name
 from svo.plant.description.model import range_of
 from svo.plant.description.table import Table
 
@@ -45,13 +47,27 @@ def nonlinear_model_of(top: Table, names: Mapping[str, Sequence[str]]) -> Nonlin
 
 
 def nonlinear_faults_of(top: Table, nominal: NonlinearModel) -> dict[str, FaultModel]:
-    """Faults of type "parameter": other bounds of some parameters."""
+    """Faults of type "parameter", other bounds of some parameters, and "sensor", an error that adds to readings."""
     every = top.table("faults")
-    return {name: _parameter_fault(check_name(every, name), nominal) for name in every.content}
+    return {name: _fault(check_name(every, name), nominal) for name in every.content}
+
+
+def _fault(table: Table, nominal: NonlinearModel) -> FaultModel:
+    is_sensor = table.text("type", choices=("parameter", "sensor")) == "sensor"
+    return _sensor_fault(table, nominal) if is_sensor else _parameter_fault(table, nominal)
+
+
+def _sensor_fault(table: Table, nominal: NonlinearModel) -> FaultModel:
+    """Any additive error up to a size, at each sample another one: as wide as more noise."""
+    table.check_keys(("type", "output", "kind", "magnitude"))
+    table.text("kind", choices=("bias", "drift"))
+    noise = nominal.noise.copy()
+    noise[np.atleast_1d(channels_of(table, "output", nominal.outputs or ()))] += abs(table.number("magnitude"))
+    with table.errors():
+        return FaultModel(nominal.replace(n=noise), contains_nominal=True)
 
 
 def _parameter_fault(table: Table, nominal: NonlinearModel) -> FaultModel:
-    table.text("type", choices=("parameter",))
     table.check_keys(("type", "parameters"))
     changed = _numbers(table.table("parameters", tuple(nominal.parameters)))
     if not changed:

@@ -65,6 +65,20 @@ def test_the_commands_print_what_the_page_shows_and_say_what_is_not_checked(
         assert json.loads(line)["source"]["model"] == "nonlinear"
 
 
+def test_a_sensor_fault_is_any_error_of_its_size(tmp_path: Path) -> None:
+    fault = '[faults.gauge]\ntype = "sensor"\noutput = "level_2"\nkind = "bias"\nmagnitude = -0.5\n\n[faults.leak]'
+    plant = described(tmp_path, "[faults.leak]", fault)
+    assert plant.faults["gauge"].contains_nominal
+    assert plant.faults["gauge"].model.noise.tolist() == [0.1, 0.6]
+    for old, new, why in (
+        ('"level_2"\nkind', '"level_3"\nkind', "expected one or more of the columns level_1, level_2"),
+        ('"bias"', '"hard"', "expected one of bias, drift"),
+        ("magnitude = -0.5\n", "", "key 'magnitude': is missing"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            described(tmp_path, "[faults.leak]", fault.replace(old, new))
+
+
 def test_an_alarm_of_other_equations_is_not_the_plants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     plant, other = described(tmp_path), described(tmp_path, "area = 154.0", "area = 154.5")
@@ -92,7 +106,7 @@ def test_an_alarm_of_other_equations_is_not_the_plants(tmp_path: Path, monkeypat
         ("d2 = 0.002 }", "d2 = -0.002 }", "d2 is between 0.002 and -0.002"),
         ('{ hole = [0.0, 0.2] }', "{ hol = [0.0, 0.2] }", "faults.leak.parameters.*did you mean 'hole'"),
         ('{ hole = [0.0, 0.2] }', "{}", r"\[faults.leak\], key 'parameters': is missing"),
-        ('type = "parameter"\nparameters = { h', 'type = "sensor"\nparameters = { h', "expected one of parameter"),
+        ('type = "parameter"\nparameters = { h', 'type = "plant"\nparameters = { h', "one of parameter, sensor"),
         ("lower = [28.0, 10.0]", "lower = [28.0]", r"\[initial\]"),
         ('h1 = "(pump', 'h3 = "(pump', r"unknown symbol 'h1'"),
     ],
