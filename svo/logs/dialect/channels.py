@@ -108,22 +108,26 @@ class Channels:
             kept = "repeat" if counts == "error" else f"share their times with others, of which {counts} counts"
             self.notes.append(f"{series.repeats} readings of {column.name} {kept} and are dropped")
         if not series.values.size:
+            self.notes += [f"{column.name} has no reading at all"] * (not self.is_input(column.name))
             return series
         if not self.is_input(column.name):
             self.notes += notes_of(series, rule, column.unit)
         return series if rule.held is None else without_repeats(series, rule.held)
 
     def _check_flag(self, name: str, block: Block) -> None:
-        """Note a flag that never is what is stated to be good."""
+        """Note a flag that never is what is stated to be good; of an input it is an error."""
         valid = self.rule(name).valid or self._dialect.valid
         if valid is None or not block.rows or good_rows(block, valid).any():
             return
         flags = block.source.column(valid.column)
         there = ", ".join(repr(flag) for flag in sorted({str(flags[row]) for row in block.rows})[:10])
-        self.notes.append(
+        found = (
             f"{name}: {block.source.label(valid.column)} never is {' or '.join(valid.good)}, so no reading counts; it "
             f"is {there}"
         )
+        if self.is_input(name):
+            raise ValueError(f"{block.source.source}, {found}. An input must be known: state its own valid, or others")
+        self.notes.append(found)
 
     def check_clocks(self, series: Mapping[str, Series], Ts: float) -> None:
         """Raise a ValueError if files begin at times that differ by more than a step: they may be of other clocks."""

@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from svo.logs.dialect.numbers import Marks
-from svo.logs.dialect.text import mark_of
+from svo.logs.dialect.text import check_text, mark_of, wide_encoding
 
 SEPARATORS = (";", "\t", "|", ",", " ")
 _LOOKED_AT = 1 << 18  # bytes
 _POINT, _COMMA = Marks("."), Marks(",")
-_GROUPS = re.compile(r"[+-]?\d{1,3}([,.' ])\d{3}(?:\1\d{3})*(?:[.,]\d+)?")
+_BLANKS = " \u00a0\u202f\u2009"
+_GROUPS = re.compile(rf"[+-]?\d{{1,3}}([,.'’{_BLANKS}])\d{{3}}(?:\1\d{{3}})*(?:[.,]\d+)?")
+_EXPONENT = re.compile(r"([+-]?\d+[.,]?\d*)[dD]([+-]\d{1,3})")
 
 
 @dataclass(frozen=True)
@@ -41,11 +43,12 @@ def text_of(path: Path) -> Text:
         data = file.read(_LOOKED_AT)
     if not data:
         raise ValueError(f"{path} is empty; expected a log")
+    check_text(path, data)
     mark, stated = mark_of(data), ""
     if mark is not None:
         data, encoding = data[len(mark[0]) :], mark[1]
     elif b"\0" in data[:200]:
-        encoding = stated = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
+        encoding = stated = wide_encoding(data)
     else:
         encoding = "utf-8" if _decodes(data, "utf-8") else "cp1252"
         stated = "" if encoding == "utf-8" else encoding
@@ -128,35 +131,51 @@ def _is_head(split: Sequence[Sequence[str]], i: int, first: int, width: int) -> 
 def cells_of(line: str, separator: str) -> list[str]:
     """The cells of one line."""
     line = " ".join(line.split()) if separator == " " else line
-    row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+    try:
+        row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+    except csv.Error:  # a cell of more than 131,072 letters is none of a log
+        return []
     return [cell.strip() for cell in row]
 
 
 def is_number(cell: str) -> bool:
     """Whether a cell is a number with one of the marks."""
-    return bool(_POINT.plain(cell) or _COMMA.plain(cell) or _GROUPS.fullmatch(cell))
+    return number_in(cell) is not None
 
 
 def number_in(cell: str) -> float | None:
     """What a cell is as a number with either mark, or with groups of thousands; None if it is none."""
+    cell = _EXPONENT.sub(r"\1e\2", cell)
     plain = _POINT.plain(cell) or _COMMA.plain(cell)
-    if plain is None and _GROUPS.fullmatch(cell):
-        plain = re.sub(r"[,.' ](?=\d{3}(?:\D|$))", "", cell).replace(",", ".")
-        plain = _POINT.plain(plain)
+    if plain is None and (groups := _GROUPS.fullmatch(cell)):
+        plain = _POINT.plain(cell.replace(groups[1], "").replace(",", "."))
     return None if plain is None else float(plain)
+
+
+def has_exponent(cells: Sequence[str]) -> bool:
+    """Whether numbers are written as 1.5D+03."""
+    return any(map(_EXPONENT.fullmatch, cells))
 
 
 def marks_in(columns: Sequence[Sequence[str]]) -> tuple[str, str]:
     """Decimal and thousands marks of the numbers in columns; "" of thousands if there are none."""
     cells = [cell for column in columns for cell in column]
-    both = [cell for cell in cells if re.search(r"\d[.,' ]\d{3}", cell) and _GROUPS.fullmatch(cell)]
-    for cell in both:
+    thousands = ""
+    for cell in cells:
+        groups = _GROUPS.fullmatch(cell)
+        if groups is None:
+            continue
         marks = [c for c in cell if not c.isdigit() and c not in "+-"]
+        mark = " " if groups[1] in _BLANKS else groups[1]
         if len(set(marks)) == 2:
-            return marks[-1], marks[0]
+            return marks[-1], mark
+        if mark not in ",." or len(marks) > 1:
+            thousands = mark
+    cells = [_EXPONENT.sub(r"\1e\2", cell) for cell in cells]
     commas = sum("," in cell and _COMMA.plain(cell) is not None for cell in cells)
     points = sum("." in cell and _POINT.plain(cell) is not None for cell in cells)
-    return ("," if commas > points else "."), ""
+    decimal = "," if commas > points and thousands != "," else "."
+    return ("," if thousands == "." else decimal), thousands
 
 
 def _fit(lines: Sequence[str], separator: str) -> float:

@@ -6,17 +6,28 @@ import json
 import re
 from collections import Counter
 from collections.abc import Sequence
+from datetime import date, timedelta
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from svo.logs.dialect.clues import Layout, Text, cells_of, is_number, layout_of, marks_in, number_in, text_of
+from svo.logs.dialect.clues import (
+    Layout,
+    Text,
+    cells_of,
+    has_exponent,
+    is_number,
+    layout_of,
+    marks_in,
+    number_in,
+    text_of,
+)
 from svo.logs.dialect.dates import suggested
 from svo.logs.dialect.mat import places_in
 from svo.logs.dialect.signatures import Signature, signature_of
-from svo.logs.dialect.stamps import UNITS, seconds
+from svo.logs.dialect.stamps import UNITS, is_duration, seconds
 from svo.logs.names import Columns
 
 _TIME = re.compile(r"time|zeit|date|datum|stamp|^t$|^t[ _\[(]", re.IGNORECASE)
@@ -26,6 +37,7 @@ _UNIT = re.compile(r"\[([^\]]+)\]|\(([^)]+)\)")
 _SENTINELS = re.compile(r"-?(?:9999?9?|7999|6999|32768|99999?)(?:\.0+)?")
 _COMMENT = re.compile(r"\s*([#%!]|//)")
 _CLOCK = re.compile(r"\d{1,2}:\d\d")
+_EPOCHS = {"1970-01-01": (10957, 32874), "1899-12-30": (36526, 62091)}  # days of the years 2000 to 2060 or 2070
 _UNITS_OF_TIME = {"ms": "ms", "msec": "ms", "us": "us", "µs": "us", "ns": "ns", "min": "min"}
 
 
@@ -99,7 +111,8 @@ class _Proposal:
         width = max(len(layout.names), *(len(row) for row in layout.rows))
         padded = [row + [""] * (width - len(row)) for row in layout.rows]
         self._cells = [list(column) for column in zip(*padded, strict=True)]
-        self._names = layout.names + [""] * (width - len(layout.names))
+        names = layout.names or self._commented(width)
+        self._names = names + [""] * (width - len(names))
 
     def lines(self) -> list[str]:
         keys = {} if self._signature is None else self._signature.keys
@@ -110,12 +123,19 @@ class _Proposal:
         if self._layout.separator != ",":
             found.append(f"separator = {_quoted(self._layout.separator)}")
         found += [f"{key} = {value}" for key, value in keys.items()]
+        time = self._time()
         found += [*self._number_marks(keys), *self._rows(keys), *self._missing()]
         long = self._long()
         if long is not None and "long" not in keys:
             found.append(f"long = {{ tag = {self._column(long[0])}, value = {self._column(long[1])} }}")
-        found += self._time()
-        return [*found, "", "[log.columns]", *self._channels("long" in keys or long is not None, long)]
+        return [*found, *time, "", "[log.columns]", *self._channels("long" in keys or long is not None, long)]
+
+    def _commented(self, width: int) -> list[str]:
+        """Names in the comment above the first row."""
+        line = self._text.lines[self._layout.first_row - 2] if self._layout.first_row > 1 else ""
+        mark = _COMMENT.match(line)
+        names = cells_of(line[mark.end() :].strip(), self._layout.separator) if mark else []
+        return names if len(names) == width and not any(map(is_number, names)) else []
 
     # -- cells -----------------------------------------------------------------------------------
 
@@ -123,31 +143,37 @@ class _Proposal:
         return [i for i, cells in enumerate(self._cells) if _share(cells) > 0.5]
 
     def _number_marks(self, keys: dict[str, str]) -> list[str]:
-        decimal, thousands = marks_in([self._cells[i] for i in self._numeric()])
+        columns = [self._cells[i] for i in self._numeric()]
+        decimal, thousands = marks_in(columns)
         found = [f'decimal = "{decimal}"'] if decimal != "." and "decimal" not in keys else []
-        return found + ([f"thousands = {_quoted(thousands)}"] if thousands else [])
+        found += [f"thousands = {_quoted(thousands)}"] if thousands else []
+        return found + ['exponent = "D"'] * any(map(has_exponent, columns))
 
     def _rows(self, keys: dict[str, str]) -> list[str]:
         layout, found = self._layout, []
-        if layout.header is None:
-            names = [f"c{i + 1}" for i in range(len(self._cells))]
-            return [f"names = {json.dumps(names)}  # the file has no line of names"]
-        comments = {mark[1] for line in self._text.lines if (mark := _COMMENT.match(line))}
-        preamble = [line for line in self._text.lines[: layout.header - 1] if line.strip() and not _COMMENT.match(line)]
-        if preamble or (self._signature and self._signature.header):
-            found.append(f"header = {layout.header}")
+        above = self._text.lines[: (layout.header or layout.first_row) - 1]
+        preamble = [line for line in above if line.strip() and not _COMMENT.match(line)]
         first = (self._signature and self._signature.first_row) or layout.first_row
-        if first != layout.header + 1:
+        if layout.header is None:
+            names = [name or f"c{i + 1}" for i, name in enumerate(self._names)]
+            remark = "of the comment above the rows" if any(self._names) else "the file has no line of names"
+            found.append(f"names = {json.dumps(names, ensure_ascii=False)}  # {remark}")
+        elif preamble or (self._signature and self._signature.header):
+            found.append(f"header = {layout.header}")
+        if first != layout.header + 1 if layout.header else preamble:
             more = f"  # more names or units: line {', '.join(map(str, layout.more))}" if layout.more else ""
             found.append(f"first_row = {first}{more}")
+        comments = {mark[1] for line in self._text.lines if (mark := _COMMENT.match(line))}
+        foreign = [line for line in dict.fromkeys(layout.foreign) if _is_foreign(line)]
+        broken = [line for line in foreign if _is_broken(line, layout.separator)]
         skip = [f"^\\s*{mark}" for mark in sorted(comments)]
-        skip += [_escaped(line) for line in dict.fromkeys(layout.foreign) if _is_foreign(line)][:5]
+        skip += [_escaped(line) for line in foreign if line not in broken][:5]
         if skip and "skip" not in keys:
             found.append(f"skip = {json.dumps(skip, ensure_ascii=False)}")
-        return found
+        return found + [f"# a row with cells that are lost? {_quoted(line.strip()[:60])}" for line in broken[:3]]
 
     def _missing(self) -> list[str]:
-        numeric = [self._cells[i] for i in self._numeric()]
+        numeric = [self._cells[i] for i in self._numeric() if i not in self._stamps]
         texts = Counter(c for cells in numeric for c in cells if c and not is_number(c) and c.lower() != "nan")
         codes = Counter(c for cells in numeric for c in cells if _SENTINELS.fullmatch(c))
         found = [f"missing = {json.dumps(list(texts), ensure_ascii=False)}"] if texts else []
@@ -179,11 +205,25 @@ class _Proposal:
     def _counted(self) -> list[str]:
         """Stamps that are numbers."""
         rising = [i for i in self._numeric() if _is_rising(self._cells[i])]
-        named = [i for i in rising if _TIME.search(self._names[i])] or rising
-        if not named:
-            return ['# time = { column = "..." }  # no column rises from row to row: or start and step?']
-        self._stamps = named[:1]
-        return [f"time = {{ column = {self._column(named[0])}{self._unit_of_stamps(named[0])}"]
+        found = {i: self._unit_of_stamps(i) for i in rising}
+        named = [i for i in rising if _TIME.search(self._names[i])] or [i for i in rising if "unit" in found[i][:8]]
+        chosen = max(named, key=lambda i: "unit" in found[i][:8], default=None)
+        if chosen is None:
+            which = " or ".join(map(self._column, rising)) or '"..."'
+            remark = "in what unit?" if rising else "no column rises from row to row: or start and step?"
+            return [f"# time = {{ column = {which} }}  # {remark}"]
+        self._stamps = [chosen]
+        return [f"time = {{ column = {self._column(chosen)}{found[chosen]}", *self._epoch(chosen, found[chosen])]
+
+    def _epoch(self, i: int, unit: str) -> list[str]:
+        """A remark if numbers seem to count from the epoch of computers, or of spreadsheets."""
+        first = next((value for cell in self._cells[i] if (value := number_in(cell)) is not None), 0.0)
+        stated = re.match(r', unit = "(\w+)"', unit)
+        days = first * seconds(UNITS[stated[1] if stated else "s"]) / 86400
+        for epoch, (low, high) in _EPOCHS.items():
+            if low < days < high:
+                return [f"# stamps of {date.fromisoformat(epoch) + timedelta(days)}? then epoch = {epoch} in time"]
+        return []
 
     def _unit_of_stamps(self, i: int) -> str:
         """What follows the column of stamps in the table: by the sampling time, or by its name."""
@@ -287,6 +327,8 @@ def _forms(cells: Sequence[str]) -> list[str]:
     filled = [cell for cell in dict.fromkeys(cells) if cell and not is_number(cell)][:200]
     if len(filled) < 0.5 * min(len(set(cells)), 200) or not filled:
         return []
+    if all(map(is_duration, filled)):
+        return ["duration"]
     every = [{form for form, _ in suggested(cell)} for cell in filled]
     whole = {re.sub(r"[.,:]%f", "", form) for form in set.union(*every)}
     kept = [form for form in whole if all(form in {re.sub(r"[.,:]%f", "", f) for f in forms} for forms in every)]
@@ -322,6 +364,11 @@ def _escaped(line: str) -> str:
 
 def _is_foreign(line: str) -> bool:
     return bool(line.strip(";,\t| ")) and not _COMMENT.match(line)
+
+
+def _is_broken(line: str, separator: str) -> bool:
+    """Whether a line seems to be a row that was damaged, which is not to be skipped without a word."""
+    return line.count('"') % 2 == 1 or all(map(is_number, filter(None, cells_of(line, separator))))
 
 
 def _unit_in(name: str) -> str:

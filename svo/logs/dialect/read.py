@@ -131,12 +131,22 @@ class _Placing:
             grid = np.append(grid, grid[-1] + self._Ts * np.arange(1, more + 1))
         for name, one in self._series.items():
             time = one.time(self._origin)
+            self._check_clock(one, time, grid)
             for edge, where in ((grid[0], "before the first"), (grid[-1], "after the last")):
                 beside = time < edge - self._Ts / 2 if where.startswith("before") else time > edge + self._Ts / 2
                 if beside.any():
                     self._check_inputs_beside(one, time, beside, edge)
                     self._notes.append(f"{beside.sum()} readings of {name} {where} of {self._anchor.name} are left out")
         return grid
+
+    def _check_clock(self, one: Series, time: Array, grid: Array) -> None:
+        """A channel all of whose readings are beside the grid has another clock."""
+        if time.size and (time[-1] < grid[0] - self._Ts / 2 or time[0] > grid[-1] + self._Ts / 2):
+            spans = [f"{when(it, it.stamp(0))} to {when(it, it.stamp(-1))}" for it in (one, self._anchor)]
+            raise ValueError(
+                f"{one.place(0)}: no reading of {one.name} ({spans[0]}) is within the time of {self._anchor.name} "
+                f"({spans[1]}); state the times of one of them as the other's clock says"
+            )
 
     def _check_inputs_beside(self, one: Series, time: Array, beside: np.ndarray, edge: float) -> None:
         """A row of a table with a reading on the grid has its inputs too."""

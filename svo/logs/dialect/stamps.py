@@ -226,6 +226,15 @@ def _since(begin: datetime, date: datetime, rest: int) -> int:
     return ((since.days * 86400 + since.seconds) * 10**6 + since.microseconds) * 10**6 + rest
 
 
+def is_duration(text: str) -> bool:
+    """Whether a text is read by the format "duration"."""
+    try:
+        _duration(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _duration(text: str) -> int:
     if found := _CLOCK.fullmatch(text):
         if found["ms"] and not found["h"]:

@@ -40,6 +40,13 @@ def mark_of(data: bytes) -> tuple[bytes, str] | None:
     return next(((mark, name) for mark, name in _MARKS if data.startswith(mark)), None)
 
 
+def check_text(path: Path, data: bytes) -> None:
+    """Raise a ValueError if a file begins as one of another kind does."""
+    binary = next((what for magic, what in _BINARY if data.startswith(magic)), None)
+    if binary is not None:
+        raise ValueError(f"{path} is no text but {binary}")
+
+
 def lines_of(path: Path, encoding: str) -> tuple[list[str], bool]:
     """The lines of a text file without their ends, and whether the last one has an end.
 
@@ -54,9 +61,7 @@ def lines_of(path: Path, encoding: str) -> tuple[list[str], bool]:
     mark = mark_of(data)
     if mark is not None:
         data, encoding = data[len(mark[0]) :], mark[1]
-    binary = next((what for magic, what in _BINARY if data.startswith(magic)), None)
-    if binary is not None:
-        raise ValueError(f"{path} is no text but {binary}")
+    check_text(path, data)
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:

@@ -225,3 +225,24 @@ def test_a_scale_that_leaves_the_floats_is_an_error(tmp_path: Path) -> None:
 
 def test_a_period_longer_than_the_log_is_no_crash(tmp_path: Path) -> None:
     assert "not held for 1e+300 s" in told(rows(STEPS), SEMICOLONS.replace('"p"', '"p", held = 1e300'), tmp_path)
+
+
+def test_readings_of_another_clock_are_an_error(tmp_path: Path) -> None:
+    """All of them would be beside the grid of the input: a log without readings."""
+    table = SEMICOLONS.replace('"f"', '"f", time = { start = 0, step = 0.1 }').replace('"t"', '"t", epoch = 1970-01-01')
+    stamps = [f"{1741943700 + k / 10:.1f}" for k in range(5)]
+    error = told(rows(stamps), table, tmp_path)
+    assert "no reading of position (2025-03-14 09:15:00 UTC to 2025-03-14 09:15:00.4 UTC)" in error
+    assert "the time of force (0 s to 0.4 s)" in error
+
+
+def test_an_output_without_a_reading_is_noted(tmp_path: Path) -> None:
+    assert "position has no reading at all" in written(tmp_path, rows(STEPS, position=[""] * 5), SEMICOLONS).notes
+
+
+def test_a_flag_that_never_is_good_is_an_error_of_an_input(tmp_path: Path) -> None:
+    text = rows(STEPS).replace("\n", ";A\n").replace("p;A", "p;ok")
+    table = SEMICOLONS.replace("[log]", '[log]\nvalid = { column = "ok", good = [1] }', 1)
+    assert "force: column 'ok' never is 1, so no reading counts; it is 'A'. An input must" in told(
+        text, table, tmp_path
+    )
