@@ -286,15 +286,21 @@ class ActuatorFault(Shown):
                 }
             return changed
 
-        fault = Uncertainty(**blocks(nominal), bounds=bounds, name=f"{self.kind} of actuator {self.where}")
+        fault = Uncertainty(**blocks(nominal), bounds=bounds, name=f"{self.kind} of {self._called(nominal)}")
         products = [product_of(u, bounds, self.kind, **blocks(u)) for u in nominal.uncertainties]
         return nominal.replace(uncertainties=[*nominal.uncertainties, fault, *(p for p in products if p is not None)])
 
     def _names(self, nominal: UncertainModel) -> dict[str, list[str]] | None:
-        if nominal.names is None or "disturbances" not in nominal.names:
-            return None if nominal.names is None else {k: list(v) for k, v in nominal.names.items()}
-        new = [f"{self.kind} of input {channel}" for channel in channels(self.where)]
-        return {k: [*v, *new] if k == "disturbances" else list(v) for k, v in nominal.names.items()}
+        if nominal.names is None:
+            return None
+        own = nominal.names.get("disturbances", [f"w[{j}]" for j in range(nominal.n_disturbances)])
+        inputs = nominal.names.get("inputs", [f"input {i}" for i in range(nominal.n_inputs)])
+        new = [f"{self.kind} of {inputs[channel]}" for channel in channels(self.where)]
+        return {**{k: list(v) for k, v in nominal.names.items()}, "disturbances": [*own, *new]}
+
+    def _called(self, nominal: UncertainModel) -> str:
+        inputs = (nominal.names or {}).get("inputs")
+        return f"actuator {self.where}" if inputs is None else ", ".join(inputs[i] for i in channels(self.where))
 
     # -- validation ------------------------------------------------------------------------------
 

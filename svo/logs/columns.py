@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
@@ -40,8 +41,11 @@ class LogNote(UserWarning):
 
 
 def noted(text: str) -> None:
-    """A `LogNote` that is a warning."""
-    warnings.warn(text, LogNote, stacklevel=3)
+    """A `LogNote` that is a warning, of the line outside of this package that had the log read."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith("svo."):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, LogNote, stacklevel=level)
 
 
 def wanted_columns(source: str, present: Sequence[str], columns: Columns) -> list[str]:

@@ -211,8 +211,9 @@ def _constant(F: Any) -> Array:
 
 def _more_names(plant: Plant, parted: NDArray[np.intp]) -> Any:
     names = plant.names
-    if names is None or "disturbances" not in names:
-        return names
-    own, states = list(names["disturbances"]), names.get("states", [f"x[{i}]" for i in range(plant.n_states)])
+    if names is None:
+        return None
+    own = list(names.get("disturbances", [f"w[{j}]" for j in range(plant.n_disturbances)]))
+    states = names.get("states", [f"x[{i}]" for i in range(plant.n_states)])
     more = [*own, *(f"mean of {own[j]}" for j in parted), *(f"remainder of {state}" for state in states)]
     return {**names, "disturbances": more}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.logs import file
-from svo.logs.columns import LogNote
+from svo.logs.columns import noted as note
 from svo.logs.dialect.read import noted, read_dialect
 from svo.logs.log import Log
 from svo.plant.dialects import dialect_of
@@ -73,8 +72,7 @@ def check_measured(path: str | Path, plant: MonitoredPlant, missing: NDArray[np.
             "these columns at least"
         )
     for name in silent:
-        said = f"{path} has no measurement of {name!r}; nothing is concluded from that sensor"
-        warnings.warn(said, LogNote, stacklevel=3)
+        note(f"{path} has no measurement of {name!r}; nothing is concluded from that sensor")
 
 
 def _read(path: str | Path, plant: MonitoredPlant) -> Log:
@@ -91,9 +89,9 @@ def imported_log(path: str | Path, plant: MonitoredPlant) -> Told | None:
     if told is None:
         return None
     dialect = dialect_of(plant)
-    warnings.warn(f"{path} was {told}", LogNote, stacklevel=4)
+    note(f"{path} was {told}")
     if told.log != (None if dialect is None else dialect.stated):
-        warnings.warn(f"{path} was imported by another [log] table than that of {plant.name}", LogNote, stacklevel=4)
+        note(f"{path} was imported by another [log] table than that of {plant.name}")
     if told.widening is not None and len(told.widening) != len(plant.columns.outputs):
         wanted = f"{len(plant.columns.outputs)}, as {plant.name} has"
         raise ValueError(f"{path} was imported for {len(told.widening)} outputs; expected {wanted}")

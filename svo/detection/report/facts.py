@@ -76,6 +76,8 @@ def log_facts(found: Detection, path: Path | None) -> dict[str, str]:
     facts = {"file": str(log.source or "none, data in memory")}
     if path is not None and path.is_file():
         facts["SHA-256"] = digest_of(path)
+    names = [column.label for column in found.plant.columns.outputs]
+    wider = [] if log.widening is None else [f"{n}: {w:.6g}" for n, w in zip(names, log.widening, strict=True) if w]
     return (
         facts
         | {
@@ -83,7 +85,7 @@ def log_facts(found: Detection, path: Path | None) -> dict[str, str]:
             "span": f"{in_seconds(float(log.time[0]), Ts)} to {in_seconds(float(log.time[-1]), Ts)}",
             "missing readings": ", ".join(f"{name}: {count}" for name, count in every.items()) or "none",
         }
-        | ({} if log.widening is None else {"widening of the noise by reading": np.array2string(log.widening)})
+        | ({"widening of the noise by reading": ", ".join(wider)} if wider else {})
     )
 
 

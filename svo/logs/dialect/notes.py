@@ -9,6 +9,7 @@ import numpy as np
 from svo.checks import Array
 from svo.logs.dialect.rules import Channel
 from svo.logs.dialect.series import Series
+from svo.logs.dialect.units import conversion
 from svo.logs.dialect.values import in_model_units
 
 _ENOUGH = 10  # readings, below which nothing is said of their kind
@@ -59,12 +60,25 @@ def _has_runs(equal: Array) -> bool:
 def _unit(series: Series, rule: Channel, unit: str) -> str:
     name = _NAME.fullmatch(series.label)
     found = _UNIT.search(name[1]) if name else None
-    if not found or rule.unit is not None or rule.scale != 1:
+    if not found or rule.scale != 1:
         return ""
-    written = found[1] or found[2]
-    if written.strip() == unit:
+    written = (found[1] or found[2]).strip()
+    if rule.unit is not None:
+        return _other_unit(series, written, rule.unit)
+    if written == unit:
         return ""
     return (
         f"{series.label} is read in {unit or 'the unit of the model'}; if it is in {written!r}, state unit in "
         f"[log.columns.{series.name}]"
     )
+
+
+def _other_unit(series: Series, written: str, stated: str) -> str:
+    """A stated unit is taken at its word, but it is told if the column's name has another one of its kind."""
+    try:
+        factor, offset = conversion(written, stated)
+    except (ValueError, ImportError):
+        return ""  # no unit, or one that pint does not know, or no pint
+    if factor == 1 and offset == 0:
+        return ""
+    return f"{series.label} is read in {stated!r}, as [log.columns.{series.name}] states, not in {written!r}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from svo.checks import Array
-from svo.logs.columns import TIME_TOLERANCE, LogNote
+from svo.logs.columns import TIME_TOLERANCE
+from svo.logs.columns import noted as warn
 from svo.logs.dialect.block import SUMMER
 from svo.logs.dialect.channels import Channels, when
+from svo.logs.dialect.clocks import check_comparable, slow_note
 from svo.logs.dialect.grid import Placed, check_unit, grid_of, most_samples, place_input, place_output
 from svo.logs.dialect.rules import Dialect
 from svo.logs.dialect.series import Series
@@ -72,7 +73,7 @@ def read_dialect(path: str | Path, columns: Columns, Ts: float, dialect: Dialect
 def noted(reading: Reading, path: str | Path) -> Log:
     """The log of a reading, with a `LogNote` for each of its notes."""
     for note in reading.notes:
-        warnings.warn(f"{path}: {note}", LogNote, stacklevel=3)
+        warn(f"{path}: {note}")
     return reading.log
 
 
@@ -99,6 +100,8 @@ class _Placing:
         every = self._channels.rule(anchor.name).every
         check_unit(anchor, self._Ts, self._channels.times(anchor.name), every)
         self._channels.check_clocks(self._series, self._Ts)
+        check_comparable(self._channels, self._series)
+        self._notes += slow_note(self._series, self._Ts)
         grid = self._extended(grid_of(anchor, self._Ts))
         placed = {name: self._place(one, grid) for name, one in self._series.items()}
         first, last = self._known(placed, grid)

@@ -55,7 +55,8 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
             raise top.table("columns").error(
                 group, f"names {len(columns)} columns; expected {sizes[group]}, the number of {group} of [model]"
             )
-    return model.replace(names=names)
+    model = model.replace(names=names)
+    return model if model.origin is None else model.origin.model()  # which names what discretisation left out
 
 
 def remainder_of(table: Table) -> Any:

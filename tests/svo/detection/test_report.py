@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from svo import detect, find_plant, read_log
 from svo.cli import app
 from svo.detection.found import Detection
+from svo.detection.report.facts import log_facts
 from svo.detection.report.options import ReportOptions
 from svo.detection.report.pictures import pictures_of
 from svo.detection.report.report import write_report
@@ -231,3 +232,10 @@ def test_names_of_somebody_else_stay_text(tmp_path: Path) -> None:
 def test_options_name_each_thing_once() -> None:
     options = ReportOptions.of(["a, b", "a"], ["SVG,png", "svg"])
     assert (options.channels, options.formats) == (("a", "b"), ("svg", "png"))
+
+
+def test_what_reading_added_to_the_noise_is_told_by_sensor_and_unit() -> None:
+    found = cart()
+    assert "widening of the noise by reading" not in log_facts(found, None)
+    rounded = replace(found, log=replace(found.log, widening=np.array([5e-4])))
+    assert log_facts(rounded, None)["widening of the noise by reading"] == "position [m]: 0.0005"

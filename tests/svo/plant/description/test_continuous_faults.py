@@ -175,3 +175,37 @@ def test_what_varies_is_a_key_of_the_file(tmp_path: Path) -> None:
         described(tmp_path, text.replace('["w"]', '"wind"'))
     with pytest.raises(ValueError, match=r"key 'varying': has no meaning for a discrete model"):
         described(tmp_path, text.replace("continuous = true", "").replace("remainder = {", "# {"))
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        'kind = "loss"\nmagnitude = 0.5', 'kind = "floating"', 'kind = "hard-over"\nmagnitude = 1.0',
+        'kind = "locking"\ntravel = [-1.0, 1.0]', 'kind = "runaway"\nmagnitude = 1.0\ntravel = [-1.0, 1.0]',
+        'kind = "oscillatory-solid"\nmagnitude = 1.0\nfrequency_hz = 0.5',
+        'kind = "oscillatory-liquid"\nmagnitude = 1.0\nfrequency_hz = 0.5',
+    ],
+)  # fmt: skip
+def test_what_discretisation_leaves_out_is_named_by_its_state(tmp_path: Path, more: str) -> None:
+    text = PLANT.replace("[model]", 'states = [{ name = "level", unit = "m" }]\n[model]').replace(
+        "C = ", "E = [[1.0]]\nw = [0.1]\nC = "
+    )
+    wider = '\n[faults.other]\ntype = "model"\nE = [[1.0, 2.0]]\nw = [0.1, 0.2]\n'
+    valve = f'[[model.uncertainties]]\nA = [[0.1]]\n[faults.valve]\ntype = "actuator"\ninput = "u"\n{more}\n'
+    bounded = "[global]\nlower = [-9.0]\nupper = [9.0]"
+    plant = described(tmp_path, text.replace("[initial]", f"{valve}[initial]") + bounded + wider)
+    nominal = plant.model
+    assert nominal.names is not None
+    assert nominal.names["disturbances"] == ["w[0]", "remainder of level"]
+    assert names_of(plant, "other") == ["w[0]", "w[1]", "remainder of level"]
+    model, kind = plant.faults["valve"].model, more.split('"')[1]
+    named = names_of(plant, "valve")
+    assert set(named) - {f"{kind} of u"} == {"w[0]", "remainder of level"}
+    assert len(named) == model.n_disturbances
+    assert f"{kind} of u" in [*named, *(item.name for item in model.uncertainties)]
+
+
+def names_of(plant: DescribedPlant, fault: str) -> list[str]:
+    names = plant.faults[fault].model.names
+    assert names is not None
+    return list(names["disturbances"])
