@@ -12,6 +12,7 @@ from pathlib import Path
 from svo.logs.dialect.numbers import Marks
 from svo.logs.dialect.text import check_text, mark_of, wide_encoding
 
+COMMENT = re.compile(r"\s*([#%!]|//)")
 SEPARATORS = (";", "\t", "|", ",", " ")
 _LOOKED_AT = 1 << 18  # bytes
 _POINT, _COMMA = Marks("."), Marks(",")
@@ -197,3 +198,18 @@ def _is_data(cells: Sequence[str]) -> bool:
 
 def _numeric(cells: Sequence[str]) -> int:
     return sum(map(is_number, cells))
+
+
+def is_broken(line: str, separator: str) -> bool:
+    """Whether a line seems to be a row that was damaged, which is not to be skipped without a word."""
+    return line.count('"') % 2 == 1 or all(map(is_number, filter(None, cells_of(line, separator))))
+
+
+def is_foreign(line: str) -> bool:
+    """Whether a line behind the first row has words of its own, beside comments."""
+    return bool(line.strip(";,\t| ")) and not COMMENT.match(line)
+
+
+def escaped(line: str) -> str:
+    """A line as a regular expression, without the marks around it."""
+    return re.sub(r"([.^$*+?{}\[\]\\|()])", r"\\\1", line.strip(' \t;,"')[:60])

@@ -14,10 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from svo.logs.dialect.clues import (
+    COMMENT,
     Layout,
     Text,
     cells_of,
+    escaped,
     has_exponent,
+    is_broken,
+    is_foreign,
     is_number,
     layout_of,
     marks_in,
@@ -35,7 +39,6 @@ _VALUE = re.compile(r"^_?(value|val|varvalue|wert|messwert)$", re.IGNORECASE)
 _FLAG = re.compile(r"valid|quality|status|guete|ok$", re.IGNORECASE)
 _UNIT = re.compile(r"\[([^\]]+)\]|\(([^)]+)\)")
 _SENTINELS = re.compile(r"-?(?:9999?9?|7999|6999|32768|99999?)(?:\.0+)?")
-_COMMENT = re.compile(r"\s*([#%!]|//)")
 _CLOCK = re.compile(r"\d{1,2}:\d\d")
 _EPOCHS = {"1970-01-01": (10957, 32874), "1899-12-30": (36526, 62091)}  # days of the years 2000 to 2060 or 2070
 _UNITS_OF_TIME = {"ms": "ms", "msec": "ms", "us": "us", "µs": "us", "ns": "ns", "min": "min"}
@@ -76,7 +79,7 @@ def guessed_table(path: str | Path, columns: Columns | None = None, Ts: float | 
 
 def _table_lines(text: Text, signature: Signature | None) -> list[str]:
     """The lines, those blanked that a signature says are none of the table."""
-    lines = [("" if _COMMENT.match(line) else line) for line in text.lines]
+    lines = [("" if COMMENT.match(line) else line) for line in text.lines]
     if signature is None or signature.header is None:
         return lines
     first = signature.first_row or signature.header + 1
@@ -133,7 +136,7 @@ class _Proposal:
     def _commented(self, width: int) -> list[str]:
         """Names in the comment above the first row."""
         line = self._text.lines[self._layout.first_row - 2] if self._layout.first_row > 1 else ""
-        mark = _COMMENT.match(line)
+        mark = COMMENT.match(line)
         names = cells_of(line[mark.end() :].strip(), self._layout.separator) if mark else []
         return names if len(names) == width and not any(map(is_number, names)) else []
 
@@ -152,7 +155,7 @@ class _Proposal:
     def _rows(self, keys: dict[str, str]) -> list[str]:
         layout, found = self._layout, []
         above = self._text.lines[: (layout.header or layout.first_row) - 1]
-        preamble = [line for line in above if line.strip() and not _COMMENT.match(line)]
+        preamble = [line for line in above if line.strip() and not COMMENT.match(line)]
         first = (self._signature and self._signature.first_row) or layout.first_row
         if layout.header is None:
             names = [name or f"c{i + 1}" for i, name in enumerate(self._names)]
@@ -163,11 +166,11 @@ class _Proposal:
         if first != layout.header + 1 if layout.header else preamble:
             more = f"  # more names or units: line {', '.join(map(str, layout.more))}" if layout.more else ""
             found.append(f"first_row = {first}{more}")
-        comments = {mark[1] for line in self._text.lines if (mark := _COMMENT.match(line))}
-        foreign = [line for line in dict.fromkeys(layout.foreign) if _is_foreign(line)]
-        broken = [line for line in foreign if _is_broken(line, layout.separator)]
+        comments = {mark[1] for line in self._text.lines if (mark := COMMENT.match(line))}
+        foreign = [line for line in dict.fromkeys(layout.foreign) if is_foreign(line)]
+        broken = [line for line in foreign if is_broken(line, layout.separator)]
         skip = [f"^\\s*{mark}" for mark in sorted(comments)]
-        skip += [_escaped(line) for line in foreign if line not in broken][:5]
+        skip += [escaped(line) for line in foreign if line not in broken][:5]
         if skip and "skip" not in keys:
             found.append(f"skip = {json.dumps(skip, ensure_ascii=False)}")
         return found + [f"# a row with cells that are lost? {_quoted(line.strip()[:60])}" for line in broken[:3]]
@@ -204,16 +207,25 @@ class _Proposal:
 
     def _counted(self) -> list[str]:
         """Stamps that are numbers."""
-        rising = [i for i in self._numeric() if _is_rising(self._cells[i])]
+        rising = [i for i in self._numeric() if _is_rising(self._of_one_tag(i))]
         found = {i: self._unit_of_stamps(i) for i in rising}
         named = [i for i in rising if _TIME.search(self._names[i])] or [i for i in rising if "unit" in found[i][:8]]
         chosen = max(named, key=lambda i: "unit" in found[i][:8], default=None)
         if chosen is None:
-            which = " or ".join(map(self._column, rising)) or '"..."'
+            backward = [i for i in self._numeric() if not rising and _TIME.search(self._names[i])]
+            which = " or ".join(map(self._column, rising or backward)) or '"..."'
             remark = "in what unit?" if rising else "no column rises from row to row: or start and step?"
+            remark = 'it goes back: also part = 2, or order = "sort"?' if backward else remark
             return [f"# time = {{ column = {which} }}  # {remark}"]
         self._stamps = [chosen]
         return [f"time = {{ column = {self._column(chosen)}{found[chosen]}", *self._epoch(chosen, found[chosen])]
+
+    def _of_one_tag(self, i: int) -> list[str]:
+        """The cells of a column; of a long log those of its first tag, whose stamps are its own."""
+        tag = (self._long() or (None,))[0]
+        if tag is None:
+            return self._cells[i]
+        return [cell for cell, of in zip(self._cells[i], self._cells[tag], strict=True) if of == self._cells[tag][0]]
 
     def _epoch(self, i: int, unit: str) -> list[str]:
         """A remark if numbers seem to count from the epoch of computers, or of spreadsheets."""
@@ -289,13 +301,17 @@ class _Proposal:
         """A line for each channel of the model that a name is close to, comments for the others."""
         rest, lines = dict(found), []
         for name in _names(self._wanted):
-            chosen = next((column for column in rest if _is_close(name, spoken.get(column, column))), None)
-            if chosen is None:
+            same = [column for column in rest if column.strip('"').lower() == name.lower()]
+            close = same or [column for column in rest if _is_close(name, spoken.get(column, column))]
+            if not close:
                 lines.append(f'# {name} = {{ {key} = "..." }}  # which one?')
                 continue
-            again = [column for column in rest if column != chosen and _is_close(name, spoken.get(column, column))]
-            also = f"  # or {' or '.join(again)}?" if again else ""
-            lines.append(f"{name} = {{ {key} = {_value(chosen)}{_stated_unit(rest.pop(chosen))} }}{also}")
+            line = f"{name} = {{ {key} = {_value(close[0])}{_stated_unit(rest[close[0]])} }}"
+            if len(close) > 1:
+                line = f"# {line}  # or {' or '.join(close[1:])}? undecided"
+            else:
+                del rest[close[0]]
+            lines.append(line)
         return lines + [f"# NAME = {{ {key} = {_value(name)}{_stated_unit(unit)} }}" for name, unit in rest.items()]
 
     def _below(self, i: int) -> list[str]:
@@ -355,20 +371,6 @@ def _is_close(name: str, spoken: str) -> bool:
     words = [word for word in re.split(r"[^a-z0-9]+", spoken.lower()) if len(word) > 2]
     name = name.lower()
     return bool(get_close_matches(name, words, n=1, cutoff=0.8)) or any(name.startswith(word) for word in words)
-
-
-def _escaped(line: str) -> str:
-    """A line as a regular expression, without the marks around it."""
-    return re.sub(r"([.^$*+?{}\[\]\\|()])", r"\\\1", line.strip(' \t;,"')[:60])
-
-
-def _is_foreign(line: str) -> bool:
-    return bool(line.strip(";,\t| ")) and not _COMMENT.match(line)
-
-
-def _is_broken(line: str, separator: str) -> bool:
-    """Whether a line seems to be a row that was damaged, which is not to be skipped without a word."""
-    return line.count('"') % 2 == 1 or all(map(is_number, filter(None, cells_of(line, separator))))
 
 
 def _unit_in(name: str) -> str:

@@ -94,3 +94,28 @@ def test_an_endless_cell_is_none_of_a_log(tmp_path: Path) -> None:
     (tmp_path / "log.txt").write_bytes(b"PK\3\4" + bytes(100))
     with pytest.raises(ValueError, match="save the sheet as CSV"):
         guessed_table(tmp_path / "log.txt")
+
+
+def test_the_same_name_counts_and_a_like_one_is_left_open_beside_another(tmp_path: Path) -> None:
+    text = "t;force_limit;force;position_raw;position_set\n" + "".join(f"{k / 10:.1f};1;{k};{k};9\n" for k in range(6))
+    table = proposal(tmp_path, text)
+    assert '\nforce = { column = "force" }\n' in table
+    assert '# position = { column = "position_raw" }  # or "position_set"? undecided' in table
+
+
+@pytest.mark.parametrize("order", ["mixed", "blocks"])
+def test_the_time_of_a_long_log_rises_within_a_tag(order: str, tmp_path: Path) -> None:
+    force = [f"{t};force;{f:g}\n" for t, f in zip(TENTHS, FORCE, strict=True)]
+    position = [f"{t};position;{p:g}\n" for t, p in zip(TENTHS, POSITION, strict=True)]
+    lines = (
+        [*force, *position] if order == "blocks" else [x for pair in zip(force, position, strict=True) for x in pair]
+    )
+    table = proposal(tmp_path, "t;name;value\n" + "".join(lines))
+    log = reading(tmp_path / "log.txt", table, tmp_path).log
+    np.testing.assert_array_equal(log.u[:, 0], FORCE)
+    np.testing.assert_array_equal(log.y[:, 0], POSITION)
+
+
+def test_a_time_that_goes_back_is_left_open(tmp_path: Path) -> None:
+    table = proposal(tmp_path, "t;force;position\n" + rows(TENTHS) + rows(TENTHS))
+    assert '# time = { column = "t" }  # it goes back: also part = 2, or order = "sort"?' in table
