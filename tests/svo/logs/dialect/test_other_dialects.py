@@ -229,11 +229,12 @@ def test_a_period_longer_than_the_log_is_no_crash(tmp_path: Path) -> None:
 
 def test_readings_of_another_clock_are_an_error(tmp_path: Path) -> None:
     """All of them would be beside the grid of the input: a log without readings."""
-    table = SEMICOLONS.replace('"f"', '"f", time = { start = 0, step = 0.1 }').replace('"t"', '"t", epoch = 1970-01-01')
-    stamps = [f"{1741943700 + k / 10:.1f}" for k in range(5)]
-    error = told(rows(stamps), table, tmp_path)
-    assert "no reading of position (2025-03-14 09:15:00 UTC to 2025-03-14 09:15:00.4 UTC)" in error
-    assert "the time of force (0 s to 0.4 s)" in error
+    (tmp_path / "log.txt").mkdir()
+    (tmp_path / "log.txt" / "f.csv").write_text("t,force\n0,1\n0.1,2\n", encoding="utf-8")
+    (tmp_path / "log.txt" / "p.csv").write_text("t,position\n1000,1\n1000.1,2\n", encoding="utf-8")
+    files = '[log.columns]\nforce = { file = "f.csv" }\nposition = { file = "p.csv" }\n'
+    with pytest.raises(ValueError, match=r"p\.csv, line 2.*\(1000 s to 1000.1 s\) is within .* force \(0 s to 0.1 s\)"):
+        reading(tmp_path / "log.txt", f'[log]\ntime = {{ column = "t", one_clock = true }}\n{files}', tmp_path)
 
 
 def test_an_output_without_a_reading_is_noted(tmp_path: Path) -> None:
