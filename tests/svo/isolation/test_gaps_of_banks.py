@@ -13,6 +13,7 @@ from svo import (
     ArchitectureII,
     ConstrainedZonotopeObserver,
     PolytopeObserver,
+    Uncertainty,
     UncertainModel,
     WindowObserver,
 )
@@ -26,10 +27,16 @@ def plant(rate: float, w: float = 0.1, **changes: Any) -> UncertainModel:
     return UncertainModel([[rate]], [[1.0]], [[1.0]], E=[[1.0]], w=[w], n=0.05, **changes)
 
 
-def chain(rate: float) -> UncertainModel:
+def faster(rate: float, **changes: Any) -> UncertainModel:
+    """A fault that may raise the rate of `plant(0.5)` up to a larger one, at each sample anew."""
+    middle, half = (0.5 + rate) / 2.0, (rate - 0.5) / 2.0
+    return plant(middle, uncertainties=[Uncertainty(A=[[half]])], **changes)
+
+
+def chain(rate: float, **changes: Any) -> UncertainModel:
     """Two states that one reading does not tell."""
     A = [[rate, 1.0], [0.0, rate]]
-    return UncertainModel(A, [[0.0], [1.0]], [[1.0, 0.0]], E=np.eye(2), w=[0.1, 0.1], n=0.05)
+    return UncertainModel(A, [[0.0], [1.0]], [[1.0, 0.0]], E=np.eye(2), w=[0.1, 0.1], n=0.05, **changes)
 
 
 def observers(kind: Any, nominal: UncertainModel, fault: UncertainModel) -> tuple[Any, dict[str, Any]]:
@@ -61,7 +68,8 @@ def test_a_bank_lives_through_a_gap_in_which_every_set_is_lost(kind: Any) -> Non
 
 def test_an_observer_that_starts_again_beside_a_lost_one_has_no_set_either() -> None:
     """The nominal one, stable, is falsified while the other's set is lost: the hull of the survivors is everything."""
-    bank = ArchitectureI(*observers(WindowObserver, chain(0.5), chain(2.0)), debounce=2)
+    fault = chain(1.25, uncertainties=[Uncertainty(A=0.75 * np.eye(2))])
+    bank = ArchitectureI(*observers(WindowObserver, chain(0.5), fault), debounce=2)
     bank.update(NOTHING)
     for _ in range(115):
         bank.step([0.0], NOTHING)
@@ -81,9 +89,9 @@ def test_an_observer_that_starts_again_beside_a_lost_one_has_no_set_either() -> 
 
 def test_the_largest_set_is_where_a_bank_starts_again_that_has_no_set_yet() -> None:
     """The first measurement falsifies every model."""
-    without = ArchitectureI(*observers(WindowObserver, plant(0.5), plant(0.6)), debounce=2)
+    without = ArchitectureI(*observers(WindowObserver, plant(0.5), faster(0.6)), debounce=2)
     assert without.update([1e6]).state == "unexplained"
-    nominal, fault = (plant(rate, largest=(-5.0, 5.0)) for rate in (0.5, 0.6))
+    nominal, fault = plant(0.5, largest=(-5.0, 5.0)), faster(0.6, largest=(-5.0, 5.0))
     bank = ArchitectureI(*observers(WindowObserver, nominal, fault), debounce=2)
     assert bank.update([1e6]).state == "nominal"
     verdict = bank.step([0.0], [1.0])
@@ -92,7 +100,7 @@ def test_the_largest_set_is_where_a_bank_starts_again_that_has_no_set_yet() -> N
 
 
 def test_the_premise_of_a_survivor_goes_over_to_who_starts_from_its_set() -> None:
-    nominal, fault = plant(0.5), plant(2.2, largest=(-5.0, 5.0))
+    nominal, fault = plant(0.5), faster(2.2, largest=(-5.0, 5.0))
     bank = ArchitectureI(*observers(WindowObserver, nominal, fault), debounce=2)
     bank.update(NOTHING)
     k = 0
@@ -136,7 +144,7 @@ def test_faults_of_class_two_start_where_the_global_set_is_lost(promised: bool) 
 
 def test_a_hull_outside_the_physical_range_of_who_starts_again_is_no_error() -> None:
     nominal = plant(0.5, physical=(-np.inf, 1e3))
-    bank = ArchitectureI(*observers(WindowObserver, nominal, plant(2.0)), debounce=2)
+    bank = ArchitectureI(*observers(WindowObserver, nominal, faster(2.0)), debounce=2)
     step = bank._start_from("nominal", HPolytope.box([1e4], [2e4]), Sample(None, NOTHING, [0.0], None))
     assert (step.verdict, step.reason) == ("undecided", "outgrown")
     assert step.box[1] == 1e3
