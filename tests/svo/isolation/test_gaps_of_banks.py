@@ -13,8 +13,8 @@ from svo import (
     ArchitectureII,
     ConstrainedZonotopeObserver,
     PolytopeObserver,
-    Uncertainty,
     UncertainModel,
+    Uncertainty,
     WindowObserver,
 )
 from svo.isolation.bank import Sample
