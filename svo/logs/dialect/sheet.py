@@ -122,6 +122,8 @@ def read_sheet(path: Path, dialect: Dialect) -> Sheet:
     while found and not any(found[-1]):  # nothing tells empty rows at the end from samples
         del found[-1], numbers[-1]
     notes += _promised(lines, dialect, len(found))
+    if dialect.counts_rows and not feed.keeps_blank:
+        notes += _blank_between(lines, numbers)
     if skipped + feed.skipped:
         notes.append(f"{skipped + feed.skipped} lines are skipped, as [log] states")
     if again:
@@ -136,6 +138,17 @@ def _promised(lines: Sequence[str], dialect: Dialect, rows: int) -> list[str]:
         if said and int(said[2]) != rows:
             return [f"the preamble says {said[1]} {said[2]}, but there are {rows} rows; the rows count"]
     return []
+
+
+def _blank_between(lines: Sequence[str], numbers: Sequence[int]) -> list[str]:
+    """A note if lines between the rows are blank, where the place of a row is its time."""
+    blank = [k for k in range(numbers[0], numbers[-1]) if not lines[k - 1].strip()] if numbers else []
+    if not blank:
+        return []
+    return [
+        f"{len(blank)} blank lines between the rows (line {blank[0]} the first) are taken for no samples; if one is, "
+        "write its separators"
+    ]
 
 
 def _no_end(line: int) -> str:

@@ -51,6 +51,13 @@ def test_a_row_of_empty_cells_is_a_sample_where_its_place_is_its_time(tmp_path: 
     assert "line 3" in told("force;position\n1;2\n;\n3;4\n", table.replace('missing = "hold"', ""), tmp_path)
 
 
+def test_blank_lines_between_rows_that_are_counted_are_noted(tmp_path: Path) -> None:
+    table = "[log]\ntime = { step = 0.1 }\n"
+    notes = written(tmp_path, "force,position\n1,2\n\n3,4\n\n", table).notes
+    assert any("1 blank lines between the rows (line 3 the first) are taken for no samples" in note for note in notes)
+    assert not written(tmp_path, "force,position\n\n1,2\n3,4\n\n", table).notes
+
+
 def test_a_blank_line_is_an_empty_cell_where_there_is_one_column(tmp_path: Path) -> None:
     (tmp_path / "log.txt").mkdir()
     (tmp_path / "log.txt" / "f.csv").write_text("force\n1\n2\n3\n", encoding="utf-8")
