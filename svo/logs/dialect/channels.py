@@ -14,7 +14,7 @@ from svo.logs.columns import TIME_TOLERANCE
 from svo.logs.dialect.block import Block, block_of, ordered
 from svo.logs.dialect.files import open_source
 from svo.logs.dialect.held import without_repeats
-from svo.logs.dialect.notes import notes_of
+from svo.logs.dialect.notes import notes_of, unit_notes
 from svo.logs.dialect.numbers import marks_of
 from svo.logs.dialect.rules import Channel, Dialect, Times, Which
 from svo.logs.dialect.series import Series, series_of
@@ -110,8 +110,7 @@ class Channels:
         if not series.values.size:
             self.notes += [f"{column.name} has no reading at all"] * (not self.is_input(column.name))
             return series
-        if not self.is_input(column.name):
-            self.notes += notes_of(series, rule, column.unit)
+        self.notes += (unit_notes if self.is_input(column.name) else notes_of)(series, rule, column.unit)
         return series if rule.held is None else without_repeats(series, rule.held)
 
     def _check_flag(self, name: str, block: Block) -> None:

@@ -36,6 +36,7 @@ from svo.logs.names import Columns
 
 _TIME = re.compile(r"time|zeit|date|datum|stamp|^t$|^t[ _\[(]", re.IGNORECASE)
 _VALUE = re.compile(r"^_?(value|val|varvalue|wert|messwert)$", re.IGNORECASE)
+_DECIMALS = re.compile(r"[+-]?\d+(?:\.(\d{1,4})|,(\d{1,2}|\d{4}))")
 _FLAG = re.compile(r"valid|quality|status|guete|ok$", re.IGNORECASE)
 _UNIT = re.compile(r"\[([^\]]+)\]|\(([^)]+)\)")
 _SENTINELS = re.compile(r"-?(?:9999?9?|7999|6999|32768|99999?)(?:\.0+)?")
@@ -295,7 +296,13 @@ class _Proposal:
             if i not in self._stamps:
                 found[self._column(i)] = units.get(i) or _unit_in(self._names[i]) or self._unit_below(i)
         spoken = {self._column(i): " ".join([self._names[i], *self._below(i)]) for i in self._numeric()}
-        return self._named(found, "column", spoken)
+        return self._named(found, "column", spoken) + self._rounded()
+
+    def _rounded(self) -> list[str]:
+        """To what the readings are rounded, which can falsify a model whose noise is without it."""
+        steps = {self._column(i): _rounding(self._cells[i]) for i in self._numeric() if i not in self._stamps}
+        told = ", ".join(f"{step} in {column}" for column, step in steps.items() if step)
+        return [f"# written to {told}: state it as resolution, unless n has the rounding in it"] if told else []
 
     def _named(self, found: dict[str, str], key: str, spoken: dict[str, str]) -> list[str]:
         """A line for each channel of the model that a name is close to, comments for the others."""
@@ -336,6 +343,14 @@ def _names(columns: Columns | None) -> list[str]:
 def _share(cells: Sequence[str]) -> float:
     filled = [cell for cell in cells if cell]
     return sum(map(is_number, filled)) / len(filled) if filled else 0.0
+
+
+def _rounding(cells: Sequence[str]) -> str:
+    """The step of numbers with a few decimals; nothing where the mark may be that of thousands."""
+    found = [_DECIMALS.fullmatch(cell) for cell in cells if cell and is_number(cell)]
+    if not found or not all(found):
+        return ""
+    return f"{10.0 ** -max(len(mark[1] or mark[2]) for mark in found if mark):g}"
 
 
 def _forms(cells: Sequence[str]) -> list[str]:

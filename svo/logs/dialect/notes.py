@@ -20,8 +20,14 @@ _UNIT = re.compile(r"\[([^\]]+)\]|\(([^)]+)\)\s*$")
 
 def notes_of(series: Series, rule: Channel, unit: str) -> list[str]:
     """Suspicions about the readings of a sensor, whose model has the ``unit``."""
-    found = [_held(series, rule), _far(series, rule, unit), _unit(series, rule, unit)]
-    return [note for note in found if note]
+    found = [_held(series, rule), _far(series, rule, unit)]
+    return [note for note in found if note] + unit_notes(series, rule, unit)
+
+
+def unit_notes(series: Series, rule: Channel, unit: str) -> list[str]:
+    """A note if the name of a column has another unit than the one that it is read in."""
+    note = _unit(series, rule, unit)
+    return [note] if note else []
 
 
 def _far(series: Series, rule: Channel, unit: str) -> str:

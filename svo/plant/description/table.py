@@ -131,7 +131,8 @@ class Table:
     def _value(self, key: str, kind: type | None, default: Any) -> Any:
         if key not in self.content:
             if default is None:
-                raise self.error(key, "is missing")
+                close = get_close_matches(key, self.content, n=1, cutoff=0.75)
+                raise self.error(key, f"is missing; is it meant by {close[0]!r}?" if close else "is missing")
             return default
         value = self.content[key]
         if kind is not None and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):

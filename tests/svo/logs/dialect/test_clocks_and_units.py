@@ -57,6 +57,13 @@ def test_a_stated_unit_that_is_not_that_of_the_name_is_told(unit: str, told: boo
     assert any("not in 'mm'" in note for note in notes) == told
 
 
+@pytest.mark.parametrize(("unit", "told"), [("", True), ("N", True), ("kN", False), ("mN", True)])
+def test_an_input_is_told_too(unit: str, told: bool, tmp_path: Path) -> None:
+    text = rows(list(range(40))).replace("t,f,", "t,f [kN],")
+    stated = table().replace('"f", ', f'"f [kN]", unit = "{unit}", ' if unit else '"f [kN]", ')
+    assert any("'kN'" in note for note in written(tmp_path, text, stated).notes) == told
+
+
 @pytest.mark.parametrize(("Ts", "told"), [(0.1, False), (0.05, True), (0.01, True)])
 def test_readings_slower_than_the_sampling_time_are_told(Ts: float, told: bool, tmp_path: Path) -> None:
     text = "t,f,p\n" + "".join(f"{k / 10},{k % 2},{k / 100}\n" for k in range(20))

@@ -119,3 +119,15 @@ def test_the_time_of_a_long_log_rises_within_a_tag(order: str, tmp_path: Path) -
 def test_a_time_that_goes_back_is_left_open(tmp_path: Path) -> None:
     table = proposal(tmp_path, "t;force;position\n" + rows(TENTHS) + rows(TENTHS))
     assert '# time = { column = "t" }  # it goes back: also part = 2, or order = "sort"?' in table
+
+
+@pytest.mark.parametrize(
+    ("position", "decimal", "told"),
+    [("{:.1f}", ",", "0.1 in"), ("{:.2f}", ".", "0.01 in"), ("{:.3f}", ",", ""), ("{:.3f}", ".", "0.001 in"), ("{:.6f}", ".", "")],
+)  # fmt: skip
+def test_to_what_readings_are_rounded_is_a_comment(position: str, decimal: str, told: str, tmp_path: Path) -> None:
+    """With a comma before three digits it may be the mark of thousands."""
+    table = proposal(tmp_path, "t;force;position\n" + rows(TENTHS, position=position).replace(".", decimal))
+    (*_, last) = table.splitlines()
+    lines = [line for line in [last] if line.startswith("# written to")]
+    assert f'{told} "position"' in lines[0] if told else not any('"position"' in line for line in lines), table

@@ -174,6 +174,7 @@ ERRORS: list[tuple[tuple[str, str], list[str]]] = [
     (("horizon = 10", "horizon = true"), ["[observer], key 'horizon'", "expected a whole number"]),
     (("horizon = 10", "template = [[1.0]]"), ["[observer]", "template has shape (1, 1)"]),
     (('type = "sensor"', ""), ["[faults.sensor], key 'type': is missing"]),
+    (('type = "sensor"', 'typ = "sensor"'), ["key 'type': is missing; is it meant by 'typ'?"]),
     (('type = "sensor"', 'type = "sensors"'), ["expected one of sensor, actuator, plant, model"]),
     (('output = "position"', 'output = "speed"'), ["[faults.sensor], key 'output'", "columns position"]),
     (('kind = "bias"', 'kind = "bais"'), ["[faults.sensor]", "kind is 'bais'; expected one of bias"]),
