@@ -12,8 +12,20 @@ from svo.logs.dialect.series import Series
 from svo.logs.dialect.stamps import PICO, seconds
 
 
-def check_comparable(channels: Channels, series: Mapping[str, Series]) -> None:
-    """Raise a ValueError if channels have times that cannot be compared, or rows are counted that their stamps deny.
+def check_kinds(series: Mapping[str, Series]) -> None:
+    """Raise a ValueError if channels have times of different kinds, which cannot be compared.
+
+    Parameters
+    ----------
+    series : mapping of str to Series
+    """
+    known = [one for one in series.values() if one.values.size]
+    for one in known[1:]:
+        _check_kind(known[0], one)
+
+
+def check_counts(channels: Channels, series: Mapping[str, Series]) -> None:
+    """Raise a ValueError if rows are counted that have other times by their stamps.
 
     Parameters
     ----------
@@ -21,12 +33,10 @@ def check_comparable(channels: Channels, series: Mapping[str, Series]) -> None:
     series : mapping of str to Series
     """
     known = [one for one in series.values() if one.values.size]
-    for one in known[1:]:
-        _check_kind(known[0], one)
     counted = [one for one in known if channels.times(one.name).step is not None]
     stamped = [one for one in known if channels.times(one.name).step is None]
     for one, other in product(counted, stamped):
-        if one.block.source is other.block.source:
+        if one.block.source is other.block.source and _kind(one) == _kind(other):
             _check_count(one, other, channels.times(one.name).step or 0.0)
 
 

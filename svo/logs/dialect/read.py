@@ -13,7 +13,7 @@ from svo.logs.columns import TIME_TOLERANCE
 from svo.logs.columns import noted as warn
 from svo.logs.dialect.block import SUMMER
 from svo.logs.dialect.channels import Channels, when
-from svo.logs.dialect.clocks import check_comparable, slow_note
+from svo.logs.dialect.clocks import check_counts, check_kinds, slow_note
 from svo.logs.dialect.grid import Placed, check_unit, grid_of, most_samples, place_input, place_output
 from svo.logs.dialect.rules import Dialect
 from svo.logs.dialect.series import Series
@@ -100,9 +100,10 @@ class _Placing:
         every = self._channels.rule(anchor.name).every
         check_unit(anchor, self._Ts, self._channels.times(anchor.name), every)
         self._channels.check_clocks(self._series, self._Ts)
-        check_comparable(self._channels, self._series)
+        check_counts(self._channels, self._series)
         self._notes += slow_note(self._series, self._Ts)
         grid = self._extended(grid_of(anchor, self._Ts))
+        check_kinds(self._series)  # those that overlap although they cannot be compared
         placed = {name: self._place(one, grid) for name, one in self._series.items()}
         first, last = self._known(placed, grid)
         time = grid[first:last]

@@ -45,10 +45,14 @@ def test_a_row_that_is_lost_or_stands_twice_is_no_count(numbers: list[int], line
     assert "start and step of force" in str(caught.value)
 
 
-@pytest.mark.parametrize(("start", "kind"), [("0", "seconds"), (f"{DAY}0", "local dates")])
-def test_dates_and_other_times_cannot_be_compared(start: str, kind: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=rf"log\.txt: times of force are {kind} .* those of position are dates"):
-        written(tmp_path, rows(list(range(40))), table(start))
+def test_local_dates_and_those_of_a_zone_cannot_be_compared(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"log\.txt: times of force are local dates .* those of position are dates"):
+        written(tmp_path, rows(list(range(40))), table(f"{DAY}0"))
+
+
+def test_dates_and_seconds_cannot_be_compared(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"log\.txt, .* \(0 s to 3\.9 s\)"):
+        written(tmp_path, rows(list(range(40))), table("0"))
 
 
 @pytest.mark.parametrize(("unit", "told"), [("mm", False), ("millimeter", False), ("cm", True), ("m", True)])

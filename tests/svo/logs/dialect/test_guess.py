@@ -123,7 +123,8 @@ def test_a_time_that_goes_back_is_left_open(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("position", "decimal", "told"),
-    [("{:.1f}", ",", "0.1 in"), ("{:.2f}", ".", "0.01 in"), ("{:.3f}", ",", ""), ("{:.3f}", ".", "0.001 in"), ("{:.6f}", ".", "")],
+    [("{:.1f}", ",", "0.1 in"), ("{:.2f}", ".", "0.01 in"), ("{:.3f}", ",", ""), ("{:.3f}", ".", "0.001 in"),
+     ("{:.6f}", ".", "")],
 )  # fmt: skip
 def test_to_what_readings_are_rounded_is_a_comment(position: str, decimal: str, told: str, tmp_path: Path) -> None:
     """With a comma before three digits it may be the mark of thousands."""
