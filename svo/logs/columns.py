@@ -137,12 +137,15 @@ def parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float, 
 
 def check_times(time: Array, Ts: float, place: Place) -> None:
     """Raise a ValueError unless time goes by the sampling time; ``place`` says where a sample stands."""
-    for k in np.flatnonzero(~_is_sampled(np.diff(time), Ts))[:1]:
-        raise wrong_step(place(int(k) + 1), time[k], time[k + 1], Ts)
+    with np.errstate(over="ignore"):  # of a damaged clock
+        steps = np.diff(time)
+    for k in np.flatnonzero(~_is_sampled(steps, Ts))[:1].tolist():
+        raise wrong_step(place(k + 1), time[k], time[k + 1], Ts)
 
 
 def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError:
     """Why time may not go so from one row to the next."""
+    before, after = float(before), float(after)  # of Python, which overflow without a warning
     step = f"{where}: time goes from {before:.9g} s to {after:.9g} s"
     if after <= before:
         return ValueError(f"{step}; expected increasing times, so sort the rows and drop doubles")
@@ -157,7 +160,7 @@ def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError
 
 def is_sampled(before: float, after: float, Ts: float) -> bool:
     """Whether a row follows another by one sampling time."""
-    return bool(_is_sampled(np.array(after - before), Ts))
+    return bool(_is_sampled(np.array(float(after) - float(before)), Ts))
 
 
 def _is_sampled(steps: Array, Ts: float) -> NDArray[np.bool_]:

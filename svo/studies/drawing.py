@@ -44,6 +44,12 @@ class Gallery:
 
     def save(self, name: str, figure: Figure, title: str, caption: str) -> Picture:
         """Write a figure, each file whole or not at all, under a ``name`` without suffix."""
-        for suffix in dict.fromkeys(("png", *self.formats)):
-            write_whole(self.folder / f"{name}.{suffix}", partial(figure.savefig, format=suffix, dpi=DPI))
-        return Picture(self.folder / f"{name}.png", title, caption)
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        for suffix in dict.fromkeys(self.formats):
+            if suffix != "png":
+                write_whole(self.folder / f"{name}.{suffix}", partial(figure.savefig, format=suffix, dpi=DPI))
+        figure.set_dpi(DPI)
+        path = self.folder / f"{name}.png"
+        write_whole(path, FigureCanvasAgg(figure).print_png)  # savefig would draw all of it once more, for the layout
+        return Picture(path, title, caption)

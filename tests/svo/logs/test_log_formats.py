@@ -246,3 +246,11 @@ def test_a_changed_number_in_a_table_that_was_written_here_is_found(tmp_path: Pa
     (tmp_path / "log.parquet").write_bytes(content[:at] + b"\1" + content[at + 1 :])
     with pytest.raises(ValueError, match="is damaged or cut off"):
         read_log(tmp_path / "log.parquet", COLUMNS, 0.1)
+
+
+@pytest.mark.parametrize("time", [[0.0, 1.7e308, 0.0], [0.0, 0.1, 1.7e308], [-1.7e308, 1.7e308, 0.0]])
+def test_a_clock_at_the_end_of_the_range_of_floats_is_one_clear_error(tmp_path: Path, time: list[float]) -> None:
+    for path, write in ((tmp_path / "log.parquet", "to_parquet"), (tmp_path / "log.csv", "to_csv")):
+        getattr(pd.DataFrame({**GOOD, "time_s": time}), write)(path, index=False)
+        with pytest.raises(ValueError, match="time goes from"):
+            read_log(path, COLUMNS, 0.1)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from svo.pictures.style import DPI, new_figure
-from svo.studies.drawing import save_picture
+from svo.studies.drawing import Gallery
 
 
 def drawn(figure: Figure) -> Figure:
@@ -33,7 +33,7 @@ def test_a_picture_is_laid_out_once_and_is_what_savefig_makes(tmp_path: Path, mo
 
     counted(ConstrainedLayoutEngine, "execute")
     counted(Figure, "draw")
-    picture = save_picture(tmp_path / "ours.png", drawn(new_figure(4, 3)), "title", "caption")
+    picture = Gallery(tmp_path).save("ours", drawn(new_figure(4, 3)), "title", "caption")
     assert sorted(calls) == ["draw", "execute"]
     ours, plain = (matplotlib.image.imread(file) for file in (picture.path, tmp_path / "plain.png"))
     np.testing.assert_array_equal(ours, plain)
