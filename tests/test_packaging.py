@@ -147,7 +147,7 @@ def test_the_installed_package_works(installed: Path, tmp_path: Path) -> None:
     assert "eclipse" in run(installed / "svo", "plants", cwd=tmp_path)
     code = (
         "from importlib.resources import files; from polytopes import HPolytope; import svo; "
-        "assert files('svo.studies').joinpath('pages', 'report.js').read_text(); "
+        "assert files('svo.pages').joinpath('templates', 'report.js').read_text(); "
         "print(svo.__file__, HPolytope.empty(2).emptiness().status)"
     )
     where, status = run(installed / "python", "-c", code, cwd=tmp_path).split()

@@ -18,6 +18,10 @@ from polytopes.native import PATH
 from tests.core.compiler import CORE, ROOT, SANITIZED, STRICT, compiled, compiler, needs_sanitizers, sources
 
 GUARDED = Path(__file__).with_name("guarded") / "memory.c"
+BESIDE = """import sys
+# a tree that is installed to be edited may lead imports to itself, whatever the path says
+sys.meta_path[:] = [finder for finder in sys.meta_path if not type(finder).__module__.startswith("_editable_")]
+"""
 
 
 def sanitized(folder: Path) -> dict[str, str]:
@@ -29,6 +33,7 @@ def sanitized(folder: Path) -> dict[str, str]:
     files = [file for file in sources() if file != CORE / "window" / "memory.c"]
     flags = (*STRICT, *SANITIZED, "-shared", "-fPIC", "-fvisibility=hidden")
     compiled(command, flags, [*files, GUARDED], package / PATH.name)
+    (folder / "sitecustomize.py").write_text(BESIDE, "utf-8")
     return os.environ | {
         "LD_PRELOAD": " ".join(runtimes),
         "PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)]),
