@@ -215,7 +215,7 @@ class Memory:
         seen = self.arrays["seen_base"]
         if ((seen < -1) | (seen > base)).any():
             raise ValueError(f"seen_base has an entry below -1 or above {base}, the oldest sample")
-        ends = {"k": self.size.K - 1, "rows": len(self.arrays["G"]), "cols": len(self.arrays["GT"]), "status": 4}
+        ends = {"k": self.size.K, "rows": len(self.arrays["G"]), "cols": len(self.arrays["GT"]), "status": 4}
         for name, end in (ends | {"owner": self.size.ni}).items():
             if ((self.arrays[name] < 0) | (self.arrays[name] >= end)).any():
                 raise ValueError(f"{name} has an entry below 0 or above {end - 1}")
