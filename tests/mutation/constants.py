@@ -99,6 +99,9 @@ CONSTANTS = (
             "polytopes/sums.h": ("UNDERFLOW_BELOW",),
             "window/factors.c": ("LEFT_OVER", "TOO_MUCH"),
             "window/ratio_test.c": ("SMALL_PIVOT", "NO_PIVOT", "SAME"),
+            "window/dual_simplex.c": ("FEASIBILITY", "NEAR_WORST", "REFACTOR", "STALLED"),
+            "window/maximise.c": ("SMALL_GAP", "GAP", "LONG", "LARGE_JITTER", "LESS_JITTER"),
+            "window/window.h": ("CLEAN_PIVOT", "SAFE_PIVOT"),
         }.items()
         for name in names
     ),
