@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import html
-import json
-import os
-import re
-import shutil
-import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -20,19 +11,16 @@ from svo.studies.configuration import StudyConfiguration
 from svo.studies.isolation.publish import publish
 from svo.studies.isolation.run import RunRow
 from svo.studies.isolation.runner import run_study
+from tests.browsing import browser_or_skip, use
 
 pytestmark = pytest.mark.browser
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-WATCH = "<script>window.errors = []; addEventListener('error', (e) => errors.push(e.message));</script>"
+DRIVER = Path(__file__).with_name("read_report.js")
 
 
 @pytest.fixture(scope="module")
 def browser() -> str:
-    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
-    if found is None:
-        pytest.skip(f"no browser on PATH: none of {', '.join(BROWSERS)}")
-    return found
+    return browser_or_skip()
 
 
 @pytest.fixture(scope="module")
@@ -45,32 +33,12 @@ def study(browser: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, 
     return (folder.path / "report.html").read_text(encoding="utf-8"), folder.rows()
 
 
-def use(browser: str, page: str, folder: Path, width: int) -> tuple[dict[str, Any], str]:
-    """What a reader sees who moves in a page, and what the browser's console says."""
-    driver = Path(__file__).with_name("read_report.js").read_text(encoding="utf-8")
-    path = folder / "page.html"
-    # What stands before the policy may run; for the driver behind it the policy has to be widened.
-    digest = base64.b64encode(hashlib.sha256(driver.encode()).digest()).decode()
-    page = page.replace("script-src ", f"script-src 'sha256-{digest}' ")
-    page = page.replace("<head>", "<head>" + WATCH).replace("</body>", f"<script>{driver}</script></body>")
-    path.write_text(page, encoding="utf-8")
-    options = ["--headless", "--disable-gpu", f"--user-data-dir={folder / 'profile'}", f"--window-size={width},1600"]
-    options += ["--enable-logging=stderr", "--virtual-time-budget=10000", "--dump-dom"]
-    if hasattr(os, "geteuid") and os.geteuid() == 0:
-        options.append("--no-sandbox")  # which the browser refuses to start with for this user
-    run = subprocess.run([browser, *options, path.as_uri()], capture_output=True, text=True, timeout=120, check=True)
-    result = re.search(r'<pre id="seen">(.*?)</pre>', run.stdout, re.DOTALL)
-    console = "\n".join(line for line in run.stderr.splitlines() if "CONSOLE" in line)
-    assert result is not None, console or run.stderr
-    return json.loads(html.unescape(result[1])), console
-
-
 @pytest.mark.parametrize("width", [1200, 420])
 def test_a_reader_can_move_in_the_report(
     browser: str, study: tuple[str, list[RunRow]], tmp_path: Path, width: int
 ) -> None:
     page, rows = study
-    seen, console = use(browser, page, tmp_path, width)
+    seen, console = use(browser, DRIVER, page, tmp_path, width)
     assert not console
     assert seen["errors"] == []
     assert seen["loaded"] == []  # nothing from elsewhere
@@ -99,7 +67,7 @@ def test_a_reader_can_move_in_the_report(
 
 def test_an_error_in_the_page_is_noticed(browser: str, study: tuple[str, list[RunRow]], tmp_path: Path) -> None:
     broken = study[0].replace("<head>", "<head><script>addEventListener('load', () => noSuchName());</script>")
-    seen, console = use(browser, broken, tmp_path, 1200)
+    seen, console = use(browser, DRIVER, broken, tmp_path, 1200)
     assert "noSuchName" in console
     assert any("noSuchName" in message for message in seen["errors"])
 
@@ -111,6 +79,6 @@ def test_an_error_in_the_page_is_noticed(browser: str, study: tuple[str, list[Ru
 def test_what_is_not_the_pages_own_does_not_run(
     browser: str, study: tuple[str, list[RunRow]], tmp_path: Path, intruder: str
 ) -> None:
-    seen, console = use(browser, study[0].replace("</body>", f"{intruder}</body>"), tmp_path, 1200)
+    seen, console = use(browser, DRIVER, study[0].replace("</body>", f"{intruder}</body>"), tmp_path, 1200)
     assert "noSuchName" not in "".join(seen["errors"])
     assert "Content Security Policy" in console
