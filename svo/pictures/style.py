@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from svo.checks import expect_kind
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -50,6 +52,9 @@ def rows_of_axes(figure: Figure, counts: Sequence[int]) -> list[list[Axes]]:
 def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
     """The axes that were given, or those of a new figure of pyplot, of a size [inches], which a notebook shows."""
     if ax is not None:
+        from matplotlib.axes import Axes
+
+        expect_kind("ax", ax, Axes, "axes of matplotlib, such as plt.subplots()[1], or None for a new figure")
         return ax
     import matplotlib.pyplot as plt
 
