@@ -159,7 +159,7 @@ def test_the_installed_package_detects_and_proves(installed: Path, tmp_path: Pat
     found = run(
         installed / "svo", "detect", EXAMPLES / "cart.toml", EXAMPLES / "cart.csv", "--out", "found", cwd=tmp_path
     )
-    assert "Fault isolated at 5 s: sensor." in found
+    assert "Fault isolated at 5.0 s: sensor." in found
     assert "2 of 2 alarms proven" in run(installed / "svo", "verify", "found/alarms.jsonl", cwd=tmp_path)
 
 

@@ -12,6 +12,7 @@ from polytopes.signatures import options_by_name
 from svo.detection.alarm_folder import ALARMS, VERDICT, check_no_results, remove_report
 from svo.interval.on_log import ThresholdDetection
 from svo.isolation import Alarm, write_alarms
+from svo.pictures.style import in_seconds
 from svo.plant import MonitoredPlant
 from svo.plant.description import check_kept_description, keep_description
 from svo.store import write_text, write_whole
@@ -153,12 +154,12 @@ class Findings(Shown, ABC):
     def _lines(self) -> Iterator[str]:
         yield from self._conclusion()
         for alarm in self.alarms:
-            yield f"    {alarm.observer}: falsified at {alarm.time:g} s"
+            yield f"    {alarm.observer}: falsified at {self._when(alarm.time)}"
         for name in self.alive:
             again = ", begun again after it was falsified (recovery)" if name in self.restarted else ""
             yield f"    {name}: explains the data to the end{again}"
         if not self.alive:
-            yield f"No model explains the data from {max(alarm.time for alarm in self.alarms):g} s on."
+            yield f"No model explains the data from {self._when(max(alarm.time for alarm in self.alarms))} on."
         if self.undecided:
             yield f"    undecided answers: {self.undecided}"
         if self.stopped:
@@ -166,12 +167,15 @@ class Findings(Shown, ABC):
         if self.thresholds is not None:
             yield self.thresholds.to_text()
 
+    def _when(self, time: float) -> str:
+        return in_seconds(time, self.plant.Ts)
+
     def _conclusion(self) -> Iterator[str]:
         if self.detected_s is None:
             yield f"No fault: the nominal model explains all {self.samples} samples ({self.noise} noise)."
             return
-        yield f"Fault detected at {self.detected_s:g} s: the nominal model is falsified ({self.noise} noise)."
+        yield f"Fault detected at {self._when(self.detected_s)}: the nominal model is falsified ({self.noise} noise)."
         if self.isolated_s is not None:
-            yield f"Fault isolated at {self.isolated_s:g} s: {self.fault}."
+            yield f"Fault isolated at {self._when(self.isolated_s)}: {self.fault}."
         elif self.alive:
             yield "Not isolated: more than one model explains the data."

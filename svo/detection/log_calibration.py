@@ -56,7 +56,7 @@ class LogCalibration:
         kind = "The smallest" if self.result.smallest else "A sufficient"
         lines = [
             f"    {w.bound}: + {rounded_up(w.amount, 4)} ({_share(w.relative)}), "
-            f"first needed at {self.time[w.sample]:g} s (sample {w.sample})"
+            f"first needed at {self.time[w.sample]:.9g} s (sample {w.sample})"
             for w in self.result.widenings
         ]
         return "\n".join([f"{kind} widening with which the nominal model explains {samples}, in model units:", *lines])

@@ -47,7 +47,7 @@ def test_a_detection_loads_nothing_that_it_does_not_need(tmp_path: Path) -> None
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     *answer, loaded = done.stdout.splitlines()
-    assert "Fault isolated at 0.5 s: alpha." in answer
+    assert "Fault isolated at 0.50 s: alpha." in answer
     assert loaded == "[]"
 
 

@@ -158,7 +158,7 @@ class LiveView:
     def _life(self, name: str, status: Status) -> Text:
         if name in status.verdict.alive:
             return Text("alive", style="green")
-        when = f" at {status.dead[name]:g} s" if name in status.dead else ""
+        when = f" at {status.dead[name]:.9g} s" if name in status.dead else ""
         return Text(f"falsified{when}", style="red")
 
 
@@ -186,7 +186,7 @@ def alarm_text(alarm: Alarm) -> str:
     first = alarm.sample + 1 - len(certificate.samples)
     window = f"sample {first}" if first == alarm.sample else f"samples {first} to {alarm.sample}"
     holds = "holds in exact arithmetic" if certificate.verify() else "DOES NOT HOLD"
-    return f"ALARM {alarm.time:g} s: {alarm.observer} is falsified; its certificate over {window} {holds}"
+    return f"ALARM {alarm.time:.9g} s: {alarm.observer} is falsified; its certificate over {window} {holds}"
 
 
 def summary(status: Status | None, why: str) -> str:

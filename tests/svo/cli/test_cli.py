@@ -80,9 +80,9 @@ def test_listing_the_plants_imports_no_scipy_signal() -> None:
 def test_a_log_is_detected_on_and_its_alarms_are_verified(log: Path, tmp_path: Path) -> None:
     found = svo("detect", "tank", log, "--out", tmp_path / "found")
     assert found.exit_code == 0
-    assert "Fault detected at 1 s" in found.stdout
-    assert "Fault isolated at 1 s: gauge" in found.stdout
-    assert "leak: falsified at 1 s" in found.stdout
+    assert "Fault detected at 1.0 s" in found.stdout
+    assert "Fault isolated at 1.0 s: gauge" in found.stdout
+    assert "leak: falsified at 1.0 s" in found.stdout
     assert "gauge: explains the data to the end" in found.stdout
     verdict = json.loads((tmp_path / "found" / "verdict.json").read_text())
     assert verdict["falsified_s"] == {"nominal": 1.0, "leak": 1.0}

@@ -93,7 +93,7 @@ def test_alarms_of_an_imported_log_are_those_of_its_source_and_are_proven(record
     for log in (recording, out):
         folder = recording.with_name(f"found_{log.suffix[1:]}")
         done = run("detect", toml, log, "--out", folder)
-        assert "Fault isolated at 5 s: sensor." in done.stdout, done.output
+        assert "Fault isolated at 5.0 s: sensor." in done.stdout, done.output
         for option in ("--log", "--full") if log is out else ("--log",):
             done = run("verify", folder / "alarms.jsonl", option, log)
             assert "2 of 2 alarms proven" in done.stdout, done.output

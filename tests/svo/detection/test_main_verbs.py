@@ -56,6 +56,12 @@ def test_the_verdict_is_that_of_the_last_sample(found: Detection) -> None:
     assert len(repr(found)) < 400
 
 
+def test_times_have_the_digits_of_the_sampling_time_also_in_long_logs(found: Detection) -> None:
+    late = detect(found.plant, replace(found.log, time=found.log.time + 1234560.0))
+    assert "Fault detected at 1234565.0 s" in str(late)
+    assert "nominal: falsified at 1234565.0 s" in str(late)
+
+
 def test_what_was_saved_is_not_overwritten(found: Detection, tmp_path: Path) -> None:
     found.save(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -150,6 +156,7 @@ def test_a_sensor_without_measurements_is_noted(found: Detection, tmp_path: Path
         (lambda found: detect(found.plant, found.log, "loud"), ValueError, "no noise set 'loud'; it has stated"),
         (lambda found: verify(found.record), TypeError, "alarms is a BankRecord; expected what svo.detect gives"),
         (lambda found: verify(found, LOG), ValueError, "a detection, which has its own; leave"),
+        (lambda found: found.plot(3), TypeError, "ax is a int; expected axes of matplotlib"),
         (lambda found: verify(CART, full=True), ValueError, "full is True and there is no log; give the log"),
     ],
 )
