@@ -43,17 +43,23 @@ class Recorder:
             return value
         if not is_finite_number(value):
             raise TypeError(f"{value!r:.80} is used in an expression; expected a finite number or an expression")
-        return self._fixed((float(value), float(value)))
+        return self.enclosed((float(value), float(value)))
 
     def put(self, op: Op, *operands: Any) -> Expression:
         """An operation; of constants, an interval that contains its value."""
         of = [self.constant(operand) for operand in operands]
         if all(self.slots[e.slot][0] is Op.CONSTANT for e in of):
             try:
-                return self._fixed(applied(op, *(self.slots[e.slot][2] for e in of)))
+                return self.enclosed(applied(op, *(self.slots[e.slot][2] for e in of)))
             except NotEnclosed as error:
                 raise NoValue(f"{op.word} of a constant has no value: {error}") from None
         return self._slot((op, tuple(e.slot for e in of), (0.0, 0.0)))
+
+    def again(self, op: Op, operands: Sequence[Expression], values: Interval) -> Expression:
+        """An operation that a tape has, or its constant."""
+        if op is Op.CONSTANT:
+            return self.enclosed(values)
+        return self.product(*operands) if op is Op.MUL else self.put(op, *operands)
 
     def product(self, a: Any, b: Any) -> Expression:
         """a b; a square where both are one, and sign(e) sqrt(|e|) as the signed root of e."""
@@ -66,7 +72,8 @@ class Recorder:
                 return root
         return self.put(Op.MUL, a, b)
 
-    def _fixed(self, values: Interval) -> Expression:
+    def enclosed(self, values: Interval) -> Expression:
+        """A constant that an interval contains."""
         return self._slot((Op.CONSTANT, (), (values[0] + 0.0, values[1] + 0.0)))
 
     def _slot(self, slot: Slot) -> Expression:

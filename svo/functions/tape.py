@@ -92,6 +92,14 @@ class Tape(Value):
         op_codes = np.array([recorder.slots[slot][0] for slot in order], dtype=np.int64)
         return cls(op_codes, operands, constants, np.array([place[r.slot] for r in rows], dtype=np.int64), variables)
 
+    def record(self, z: Sequence[Expression], recorder: Recorder) -> list[Expression]:
+        """The rows, of coordinates or constants z (nz,), as a function that is traced gives them."""
+        found: list[Expression] = []
+        for op, of, values in self._program:
+            is_given = op is Op.VARIABLE
+            found.append(z[of[0]] if is_given else recorder.again(op, [found[i] for i in of], values))
+        return [found[i] for i in self.outputs]
+
     @cached_property
     def used(self) -> NDArray[np.bool_]:
         """Which coordinates the rows depend on (nz,)."""

@@ -88,9 +88,13 @@ class Observer(Shown, ABC):
     _newest: Step | None = None
 
     def __init__(self, model: UncertainModel) -> None:
-        if not (self.takes_nonlinear and isinstance(model, NonlinearModel)):
-            expect_model("model", model)
+        self._expect_model(model)
         self.model = model
+
+    @classmethod
+    def _expect_model(cls, model: Any) -> None:
+        if not (cls.takes_nonlinear and isinstance(model, NonlinearModel)):
+            expect_model("model", model)
 
     def __repr__(self) -> str:
         options = ", ".join(f"{name} {brief(value)}" for name, value in self._options().items())
@@ -342,12 +346,13 @@ class Observer(Shown, ABC):
         Raises
         ------
         TypeError
-            If observers of this kind cannot be saved (`saves_state`).
+            If observers of this kind cannot be saved (`saves_state`), or take no such model.
         ValueError
             If the state is not that of such an observer of this very model, or was changed since.
         """
         observer = cls.__new__(cls)
         observer._check_can(cls.saves_state, "has no state_dict: it cannot be saved")
+        cls._expect_model(model)
         try:
             check_unchanged(state)
             observer._set_up(model, state)

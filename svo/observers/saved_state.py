@@ -19,6 +19,7 @@ from polytopes import HPolytope
 from svo.checks import Array
 from svo.models import ModelSample, UncertainModel, model_digest
 from svo.models.digest import Options
+from svo.models.nonlinear import NonlinearModel
 
 Value = TypeVar("Value")
 State = Mapping[str, NDArray[Any]]
@@ -26,13 +27,15 @@ MODEL, WHOLE, SCHEDULE = "seal.model", "seal.state", "seal.schedule"
 _SET = ("A", "b", "C", "d")
 
 
-def sealed(state: State, model: UncertainModel, options: Options, schedule: Any) -> dict[str, NDArray[Any]]:
+def sealed(
+    state: State, model: UncertainModel | NonlinearModel, options: Options, schedule: Any
+) -> dict[str, NDArray[Any]]:
     """A copy of a state with the digests of its model and of itself.
 
     Parameters
     ----------
     state : mapping of str to array
-    model : UncertainModel
+    model : UncertainModel or NonlinearModel
     options : mapping
         Of the observer, as its ``options``.
     schedule : optional
@@ -54,7 +57,7 @@ def check_unchanged(state: State) -> None:
         raise ValueError("its arrays were changed, or some are missing, since state_dict() made it")
 
 
-def check_model(state: State, model: UncertainModel, options: Options) -> None:
+def check_model(state: State, model: UncertainModel | NonlinearModel, options: Options) -> None:
     """Raise ValueError if a state is that of another model, or of an observer with other options."""
     if str(state[MODEL]) != _digest_of_model(state, model, options):
         raise ValueError(
@@ -125,10 +128,11 @@ def _as_array(schedule: Any) -> NDArray[Any]:
     return value
 
 
-def _digest_of_model(state: State, model: UncertainModel, options: Options) -> str:
-    samples = [ModelSample.of(model, model.schedule)]
+def _digest_of_model(state: State, model: UncertainModel | NonlinearModel, options: Options) -> str:
+    linear: UncertainModel = model.carrier if isinstance(model, NonlinearModel) else model
+    samples = [ModelSample.of(linear, linear.schedule)]
     if model.is_scheduled and SCHEDULE in state:
-        samples.append(ModelSample.of(model, last_schedule(state)))
+        samples.append(ModelSample.of(linear, last_schedule(state)))
     return model_digest(model, options, samples)
 
 

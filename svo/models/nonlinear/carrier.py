@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,10 +35,14 @@ class Linearisation(NamedTuple):
     @classmethod
     def before(cls, reading: LinearOutput, noise: Array) -> Linearisation:
         """Of a sample from which no transition is known yet."""
-        (ny, n), nw = reading.C.shape, reading.F.shape[1]
         width = (noise + reading.R) * (1.0 + 4.0 * np.finfo(float).eps)
-        F = np.hstack([reading.F, np.zeros((ny, n))])
-        return cls(np.eye(n), np.zeros(n), np.zeros((n, nw + n)), reading.C, reading.c, F, width)
+        return cls.measured(reading.C, reading.c, np.hstack([reading.F, np.zeros(reading.C.shape)]), width)
+
+    @classmethod
+    def measured(cls, C: Array, c: Array, F: Array, n: Array) -> Linearisation:
+        """Of a sample of which only the measurement is known."""
+        size = C.shape[1]
+        return cls(np.eye(size), np.zeros(size), np.zeros((size, F.shape[1])), C, c, F, n)
 
     def moved(self, found: Transition) -> Linearisation:
         """The same sample with the transition from it."""
@@ -56,8 +61,8 @@ def carrier_of(
     typical = Linearisation(*state, *output, np.ones((ny, columns)), noise)
     unit = np.ones(n)
     return UncertainModel(
-        lambda at: at.A, np.zeros((n, nu)), lambda at: at.C, a=lambda at: at.a, E=lambda at: at.E, c=lambda at: at.c,
-        F=(lambda at: at.F) if is_disturbed else None,
-        n=lambda at: at.n, w=(np.concatenate([flow.w.lower, -unit]), np.concatenate([flow.w.upper, unit])), Ts=Ts,
+        attrgetter("A"), np.zeros((n, nu)), attrgetter("C"), a=attrgetter("a"), E=attrgetter("E"), c=attrgetter("c"),
+        F=attrgetter("F") if is_disturbed else None,
+        n=attrgetter("n"), w=(np.concatenate([flow.w.lower, -unit]), np.concatenate([flow.w.upper, unit])), Ts=Ts,
         physical=physical, largest=largest, schedule=typical,
     )  # fmt: skip

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polytopes.shown import Shown, counted
 from polytopes.signatures import options_by_name
+from polytopes.value import Value
 from svo.checks import Array, expect, expect_kind, expect_shape, finite_array, is_count, positive_number, sizes
 from svo.functions.operations import Op
 from svo.functions.tape import Tape
@@ -20,7 +21,7 @@ from svo.models.nonlinear.carrier import carrier_of
 from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput, check_output, linear_output
 from svo.models.nonlinear.simulation import simulated
-from svo.models.nonlinear.tracing import Function, Symbols, traced
+from svo.models.nonlinear.tracing import Function, Retraced, Symbols, traced
 from svo.models.nonlinear.transition import Transition, mapped, transition
 from svo.models.state_range import StateRange, start_range, state_range
 
@@ -29,7 +30,7 @@ _WORTH_ANOTHER = 0.1  # of the width of the set: a remainder beyond it is worth 
 
 @options_by_name
 @dataclass(frozen=True, eq=False)
-class NonlinearModel(Shown):
+class NonlinearModel(Value, Shown):
     """A plant dx/dt = f(x, u, w, p), y = h(x, u, w, p) + v, |v| <= n, taken by `WindowObserver`.
 
     f and h are traced once. At each sample the observer linearises the plant over the set that it knows, with a bound
@@ -115,7 +116,7 @@ class NonlinearModel(Shown):
         twice = next((name for name in all_names if all_names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"the name {twice!r} stands for two things; expected states, inputs and so on to differ")
-        symbols, n = Symbols(self.states, self.disturbances, tuple(self.parameters), self.inputs), len(self.states)
+        symbols, n = self._symbols, len(self.states)
         low, high = (end[len(self.disturbances) :] for end in span)
         fixed = np.where(low == high, low, np.nan)
         for name in ("physical", "valid"):
@@ -138,7 +139,16 @@ class NonlinearModel(Shown):
         noise = np.full(ny, self.n) if np.ndim(self.n) == 0 else self.n
         put("noise", sizes("n", noise, ny))
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Functions travel as what they were traced to: a pickle need not know where they were written."""
+        f = Retraced.of("f", self.f, self._symbols, self.states)
+        return self.__dict__ | {"f": f, "h": Retraced.of("h", self.h, self._symbols, self.outputs)}
+
     # -- sizes -----------------------------------------------------------------------------------
+
+    @property
+    def _symbols(self) -> Symbols:
+        return Symbols(self.states, self.disturbances, tuple(self.parameters), self.inputs)
 
     def __repr__(self) -> str:
         sizes = {"state": self.n_states, "input": self.n_inputs, "output": self.n_outputs}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,6 +79,32 @@ def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequ
         found = list(found)
         names = [f"y[{i}]" for i in range(len(found))]
     return Tape.of(recorder, rows_of(what, found, recorder, names), first)
+
+
+class Retraced:
+    """A function of the model as the tape that it was traced to, with every parameter a coordinate.
+
+    It is what a pickle holds of a function, which need not be one that a pickle can hold.
+    """
+
+    def __init__(self, tape: Tape, sizes: Sizes) -> None:
+        self.tape = tape
+        self.letters = [letter for letter, size in zip(ORDER, sizes, strict=True) if size]
+        self.__signature__ = Signature([Parameter(letter, Parameter.KEYWORD_ONLY) for letter in self.letters])
+
+    def __call__(self, **vectors: Any) -> Any:
+        """Rows of expressions, or of numbers."""
+        z = np.concatenate([vectors[letter] for letter in self.letters])
+        first = next((v for v in z if isinstance(v, Expression)), None)
+        return self.tape.values(z) if first is None else self.tape.record(list(z), first.recorder)
+
+    @classmethod
+    def of(cls, what: str, function: Function, symbols: Symbols, names: Sequence[str] | None) -> Function:
+        """A function's; text stays as it is."""
+        if isinstance(function, Mapping | Retraced):
+            return function
+        free = np.full(len(symbols.p), np.nan)
+        return cls(traced(what, function, symbols, free, names), Sizes(*map(len, symbols)))
 
 
 def _written(

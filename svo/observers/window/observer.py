@@ -97,21 +97,28 @@ class WindowObserver(Observer):
         sign_split: int = 0,
     ) -> None:
         super().__init__(model)  # type: ignore[arg-type]  # a nonlinear one answers what is asked of it here
+        linear = self._plan_for(model)
         if horizon is not None:
             expect(is_count(horizon, 1), "horizon", horizon, "an integer number of steps >= 1, or None for all data")
         slack = relative_slack(eps)
         expect(is_count(sign_split, 0), "sign_split", sign_split, "a number of cells >= 0 (0 = convex hulls)")
         rows = template_rows(template, model.n_states)
         lower, upper = first_box(initial, self.model)
-        self._plant: Relinearised | None = None
-        linear = self.model
         if isinstance(model, NonlinearModel):
             model.check_first(lower, upper)
-            self._plant, linear = Relinearised(model), model.carrier
         form = NormalForm.at(linear, lower, upper)
         steps = None if horizon is None else int(horizon)
         self._configure(WindowSettings(form, steps, rows * form.x, slack, int(sign_split)))
         self._reset(initial, lower, upper)
+
+    def _plan_for(self, model: UncertainModel | NonlinearModel) -> UncertainModel:
+        """The linear model of the window, and what makes one of a nonlinear model."""
+        self.model, self._plant = model, None  # type: ignore[assignment]
+        if isinstance(model, UncertainModel):
+            return model
+        self._plant = Relinearised(model)
+        carrier: UncertainModel = model.carrier
+        return carrier
 
     def _configure(self, settings: WindowSettings, prover: Callable[[bool], Prover] | None = None) -> None:
         """Settings, and what makes a prover of a window whose anchor follows from its readings, or does not."""
@@ -228,8 +235,6 @@ class WindowObserver(Observer):
         return {"horizon": horizon, "template": rows, "eps": self.eps, "sign_split": cells}
 
     def _state(self) -> dict[str, NDArray[Any]]:
-        if self._plant is not None:
-            raise TypeError("the observer has a nonlinear model, with which it cannot be saved yet")
         window, lost = self._window, self._lost
         horizon = -1.0 if self.horizon is None else self.horizon
         largest = NO_SAMPLE if self.largest_at is None else self.largest_at
@@ -245,12 +250,14 @@ class WindowObserver(Observer):
         state |= arrays_of("initial", self._initial)
         if self._readings is not None:
             state |= self._readings.state()
+        if self._plant is not None:
+            state |= self._plant.state()
         return state | self._form.state_dict() | window.state()
 
-    def _set_up(self, model: UncertainModel, state: Mapping[str, NDArray[Any]]) -> None:
-        self.model, self._plant = model, None
+    def _set_up(self, model: UncertainModel | NonlinearModel, state: Mapping[str, NDArray[Any]]) -> None:
+        linear = self._plan_for(model)
         horizon, _, eps, cells = (float(v) for v in state["settings"])
-        form, steps = NormalForm.from_state_dict(model, state), None if horizon < 0 else int(horizon)
+        form, steps = NormalForm.from_state_dict(linear, state), None if horizon < 0 else int(horizon)
         template = numbers(state, "template", "r", model.n_states)
         self._configure(WindowSettings(form, steps, template, eps, int(cells)))
 
@@ -269,6 +276,8 @@ class WindowObserver(Observer):
             self._readings.restore(state)
         elif lost:
             raise ValueError("it has lost its set, and holds no readings to find one again")
+        if self._plant is not None:
+            self._plant.resume(state, has_samples=self._number >= 0)
         return self._said("falsified") if falsified else None
 
     def _read_arrival(self, state: Mapping[str, NDArray[Any]], name: str) -> ArrivalSet:

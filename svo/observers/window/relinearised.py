@@ -6,10 +6,17 @@ handed over afterwards, before the window takes the next sample. Everything here
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from svo.checks import Array
 from svo.models.nonlinear import Linearisation, LinearOutput, NonlinearModel, Span, Undecided, cut
+from svo.observers.saved_state import numbers
+
+_MEASURED = ("C", "c", "F", "n")  # what a sample has without a transition
 
 OUTSIDE_MODEL = "outside"  # how a reason begins that a sample is not linearised
 _BLUNT = 1e-3  # of the noise: a remainder of the output beyond it is worth a second linearisation over what is left
@@ -89,3 +96,24 @@ class Relinearised:
         if left is not None:
             self.box = left
         return output
+
+    # -- saved states ------------------------------------------------------------------------------------
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What the next samples depend on, as named arrays."""
+        now = {} if self._now is None else {f"plant.{name}": getattr(self._now, name) for name in _MEASURED}
+        return {"plant.box": np.array(self.box), "plant.reason": np.array(self.reason or "")} | now
+
+    def resume(self, state: Mapping[str, NDArray[Any]], has_samples: bool) -> None:
+        """Take back what `state` gave; KeyError or ValueError unless it is that of such a model."""
+        model = self.model
+        n, ny, columns = model.n_states, model.n_outputs, model.carrier.n_disturbances
+        box = Span(*numbers(state, "plant.box", 2, n))
+        if not (box.lower <= box.upper).all():
+            raise ValueError(f"plant.box is from {box.lower} to {box.upper}; expected a box")
+        self.box, self._now, self.reason = box, None, str(state["plant.reason"]) or None
+        if has_samples:
+            shapes = zip(_MEASURED, ((ny, n), (ny,), (ny, columns), (ny,)), strict=True)
+            self._now = Linearisation.measured(*(numbers(state, f"plant.{name}", *shape) for name, shape in shapes))
+            if (self._now.n < model.noise).any():
+                raise ValueError("plant.n is below the noise of the model")

@@ -244,7 +244,5 @@ def test_what_a_nonlinear_model_cannot_do_is_one_error() -> None:
     with pytest.raises(ValueError, match="schedule is given; a nonlinear model takes none"):
         observer.update([0.4], schedule=1.0)
     observer.update([0.4])
-    with pytest.raises(TypeError, match="nonlinear model, with which it cannot be saved"):
-        observer.state_dict()
     with pytest.raises(TypeError, match="model is a NonlinearModel; expected an UncertainModel"):
         PolytopeObserver(case.model, HPolytope.box(case.x0, case.x0))

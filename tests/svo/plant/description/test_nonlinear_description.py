@@ -65,6 +65,22 @@ def test_the_commands_print_what_the_page_shows_and_say_what_is_not_checked(
         assert json.loads(line)["source"]["model"] == "nonlinear"
 
 
+def test_a_watch_goes_on_where_it_was(tmp_path: Path) -> None:
+    shutil.copy(EXAMPLES / "two_tanks.toml", tmp_path)
+    lines = (EXAMPLES / "two_tanks.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    found = []
+    for folder, cuts in (("whole", (len(lines),)), ("pieces", (3, 40, 62, len(lines)))):
+        command = ["watch", str(tmp_path / "two_tanks.toml"), str(tmp_path / "log.csv"), "--until-end"]
+        command += ["--out", str(tmp_path / folder), "--state", str(tmp_path / f"{folder}.state")]
+        for cut in cuts:
+            (tmp_path / "log.csv").write_text("".join(lines[:cut]), encoding="utf-8")
+            done = CliRunner().invoke(app, command)
+            assert done.exit_code == 0, done.output
+        found.append((tmp_path / folder / "alarms.jsonl").read_bytes())
+    assert found[0] == found[1]
+    assert found[0].count(b"\n") == 2
+
+
 def test_a_sensor_fault_is_any_error_of_its_size(tmp_path: Path) -> None:
     fault = '[faults.gauge]\ntype = "sensor"\noutput = "level_2"\nkind = "bias"\nmagnitude = -0.5\n\n[faults.leak]'
     plant = described(tmp_path, "[faults.leak]", fault)
