@@ -19,7 +19,9 @@ from svo.observers.saved_state import numbers
 _MEASURED = ("C", "c", "F", "n")  # what a sample has without a transition
 
 OUTSIDE_MODEL = "outside"  # how a reason begins that a sample is not linearised
-_BLUNT = 1e-3  # of the noise: a remainder of the output beyond it is worth a second linearisation over what is left
+_BLUNT = 1e-3  # of the noise: a remainder of the output beyond it is worth another linearisation over what is left
+_WORTHWHILE = 0.8  # of a remainder that one more leaves, and yet another is worth it
+_CUTS = 10
 
 
 class Relinearised:
@@ -86,15 +88,18 @@ class Relinearised:
         return self._now, y
 
     def _cut(self, y: Array, u: Array) -> LinearOutput:
-        """The output over the box, which it cuts; again over what is left where its remainder blurs the readings."""
+        """The output over the box, which it cuts; again over what is left while its remainder blurs the readings."""
         noise, w = self.model.noise, self.model.flow.w
-        output = self.model.output(self.box.lower, self.box.upper, u)
-        left = cut(self.box, y, output, w, noise)
-        if left is not None and (output.R - _BLUNT * noise > 0.0).any():
-            output = self.model.output(left.lower, left.upper, u)
-            left = cut(left, y, output, w, noise)
-        if left is not None:
+        before = np.full(len(noise), np.inf)
+        for _ in range(_CUTS):
+            output = self.model.output(self.box.lower, self.box.upper, u)
+            left = cut(self.box, y, output, w, noise)
+            if left is None:
+                break
             self.box = left
+            if not ((_BLUNT * noise < output.R) & (_WORTHWHILE * before > output.R)).any():
+                break
+            before = output.R
         return output
 
     # -- saved states ------------------------------------------------------------------------------------
