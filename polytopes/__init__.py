@@ -1,22 +1,29 @@
 """Set algebra of polyhedra ``{x : A x <= b, C x = d}`` with certified emptiness.  Knows nothing of dynamics."""
 
 from polytopes.certificate import Certificate
+from polytopes.containment import Containment
 from polytopes.emptiness import Emptiness
 from polytopes.errors import EmptySetError, ProjectionLimitError, UnboundedError, UndecidedError
 from polytopes.generators import Generators
 from polytopes.hpolytope import HPolytope
 from polytopes.linear_program import warm_up
+from polytopes.redundancy import KeptRows
+from polytopes.separation import Intersects, SeparatingPlane
 from polytopes.support import Ball, SupportResult
 from polytopes.unions import convex_hull, union_bounds
 
 __all__ = [
     "Ball",
     "Certificate",
+    "Containment",
     "Emptiness",
     "EmptySetError",
     "Generators",
     "HPolytope",
+    "Intersects",
+    "KeptRows",
     "ProjectionLimitError",
+    "SeparatingPlane",
     "SupportResult",
     "UnboundedError",
     "UndecidedError",

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from polytopes.checks import Floats
 from polytopes.emptiness import combined_value, float_combination, strictly_inside
 from polytopes.errors import EmptySetError, UndecidedError
-from polytopes.rows import Rows
+from polytopes.exact import rational_matrix
+from polytopes.rows import Rows, Table, nothing
 from polytopes.support import known_nonempty
 
 
@@ -31,7 +33,7 @@ def implicit_equalities(P: Rows) -> list[int]:
             return found
         numbers = [i for i in range(P.b.size) if i not in found]
         found = sorted(found + [numbers[i] for i in fresh])
-        rest = _made_explicit(P, found)
+        rest = made_explicit(P, found)
     return found
 
 
@@ -51,7 +53,8 @@ def _equalities_of_a_proof(P: Rows) -> list[int]:
     return [] if outcome.status == "reached" else [int(program.kept[i]) for i in outcome.multipliers]
 
 
-def _made_explicit(P: Rows, rows: list[int]) -> Rows:
+def made_explicit(P: Rows, rows: list[int]) -> Rows:
+    """P with some rows of A as equalities, the last ones of C."""
     others = np.setdiff1d(np.arange(P.b.size), rows)
     return Rows(P.A[others], P.b[others], np.vstack([P.C, P.A[rows]]), np.concatenate([P.d, P.b[rows]]))
 
@@ -59,7 +62,24 @@ def _made_explicit(P: Rows, rows: list[int]) -> Rows:
 def explicit(P: Rows) -> Rows:
     """The same set with its implicit equalities made explicit; P itself if there are none."""
     rows = implicit_equalities(P)
-    return _made_explicit(P, rows) if rows else P
+    return made_explicit(P, rows) if rows else P
+
+
+def hull_of(P: Rows) -> Table:
+    """Rows of the affine hull: independent equalities of P, explicit and implicit ones; empty if P is."""
+    if not known_nonempty(P):
+        return nothing(P.dim)
+    flat = explicit(P)
+    chosen = independent_rows(flat.C)
+    return np.empty((0, P.dim)), np.empty(0), flat.C[chosen], flat.d[chosen]
+
+
+def independent_rows(C: Floats) -> list[int]:
+    """A largest set of exactly independent rows."""
+    if C.shape[0] == 0:
+        return []
+    reduced, rank = rational_matrix(np.ascontiguousarray(C.T)).rref()
+    return [next(j for j in range(C.shape[0]) if reduced[k, j] != 0) for k in range(rank)]
 
 
 def affine_dim(P: Rows) -> int:

@@ -1,11 +1,36 @@
 """Points and sets inside a set, and equality of sets, with a stated tolerance."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes.answers import Answer
 from polytopes.checks import Floats
+from polytopes.inclusion import half_spaces
 from polytopes.rows import Rows
-from polytopes.support import known_nonempty
+from polytopes.support import known_nonempty, support_points
+
+
+@dataclass(frozen=True, eq=False)
+class Containment(Answer):
+    """Whether a set lies in another; true or false in an ``if``.
+
+    Attributes
+    ----------
+    holds : bool
+    counterexample : array (n,) or None
+        Where it does not hold: a point of the inner set beyond the row, the farthest one if there is one.
+    row : int or None
+        The row that it breaks: row i of A, or row i - m of C.
+    excess : float
+        How far the inner set reaches beyond that row, a distance in the units of x; 0 where it holds, inf where the
+        set is unbounded along the normal.
+    """
+
+    counterexample: Floats | None = None
+    row: int | None = None
+    excess: float = 0.0
 
 
 def contains_points(P: Rows, points: Floats, tol: float) -> NDArray[np.bool_]:
@@ -16,18 +41,37 @@ def contains_points(P: Rows, points: Floats, tol: float) -> NDArray[np.bool_]:
     return inside & on
 
 
-def contains_set(P: Rows, Q: Rows, tol: float) -> bool:
+def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
     """Whether every point of Q is within `tol` of every half-space and hyperplane of P.
 
     That is ``h_Q(a_i) <= b_i + tol |a_i|`` for every row of P (both signs for an equality); the empty set lies in any.
     """
     if not known_nonempty(Q):
-        return True
-    normals, rhs = np.vstack([P.A, P.C, -P.C]), np.concatenate([P.b, P.d, -P.d])
-    farthest = Q.program.estimate(normals)
-    return bool((farthest <= rhs + tol * np.linalg.norm(normals, axis=1)).all())
+        return Containment(True)
+    normals, sides = half_spaces(P)
+    lengths = np.linalg.norm(normals, axis=1)
+    beyond = Q.program.estimate(normals) - sides
+    broken = ~(beyond <= tol * lengths)
+    if not broken.any():
+        return Containment(True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        excess = np.where(broken, np.where(np.isnan(beyond), np.inf, beyond) / lengths, -np.inf)
+    i = int(np.argmax(excess))
+    row = i if i < P.b.size + P.d.size else i - P.d.size
+    return Containment(False, _beyond(Q, normals[i], float(sides[i]), tol), row, float(excess[i]))
+
+
+def _beyond(Q: Rows, normal: Floats, side: float, tol: float) -> Floats | None:
+    """A point of Q beyond a row: the farthest, or, where there is none, one as far beyond as Q is from the origin."""
+    best = support_points(Q, normal)
+    if np.isfinite(best.values[0]):
+        return best.points[0]
+    near = Q.program.interior.point
+    room = float(np.linalg.norm(normal)) * (2.0 * tol + float(np.linalg.norm(near)) + 1.0)
+    far = max(side, float(normal @ near)) + room
+    return Q.with_rows(np.vstack([Q.A, -normal]), np.append(Q.b, -far)).decided.witness
 
 
 def equal_sets(P: Rows, Q: Rows, tol: float) -> bool:
     """Whether each set contains the other within `tol`."""
-    return contains_set(P, Q, tol) and contains_set(Q, P, tol)
+    return bool(contains_set(P, Q, tol)) and bool(contains_set(Q, P, tol))

@@ -370,7 +370,7 @@ class Program:
         return point, weights, bounds, status if status in (OPTIMAL, UNBOUNDED) else UNDECIDED
 
     @derived
-    def _exact_point(self) -> list[fmpq] | None:
+    def exact_point(self) -> list[fmpq] | None:
         """A point that satisfies every row exactly; None if the rational simplex is not affordable or did not end."""
         if not self.exact.affordable:
             return None
@@ -394,7 +394,7 @@ class Program:
     def _maximise_carefully(self, direction: Floats, reduced: Floats, top: int) -> tuple[str, float, Floats, Floats]:
         """The rational simplex if it is affordable, else HiGHS, accepted if the bound is near the maximum."""
         nowhere, nothing = np.full(self.flat.dim, np.nan), np.zeros(self.b.size)
-        start = self._exact_point
+        start = self.exact_point
         if start is not None:
             outcome = self.exact.maximum(direction, start)
             if outcome.status == "optimal":

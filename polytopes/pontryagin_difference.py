@@ -7,7 +7,8 @@ import numpy as np
 
 from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
-from polytopes.integers import is_short, up
+from polytopes.exact_sides import with_sides
+from polytopes.integers import is_short
 from polytopes.linear_program import Program
 from polytopes.outer_supports import exact_supports, lower_supports
 from polytopes.rows import Rows, Table, everything, nothing
@@ -64,22 +65,5 @@ def _moved_exactly(P: Rows, supports: Sequence[Fraction], constant: Floats) -> T
     if any(supports[k + i] + supports[k + q + i] > constant[i] for i in range(q)):
         return nothing(P.dim)
     middles = [(supports[k + i] - supports[k + q + i]) / 2 for i in range(q)]
-    inner = [_row(row, Fraction(b) - h) for row, b, h in zip(P.A, P.b.tolist(), supports[:k], strict=False)]
-    fixed: list[Floats] = []
-    for row, d, middle in zip(P.C, P.d.tolist(), middles, strict=True):
-        above, below = _row(row, Fraction(d) - middle), _row(-row, middle - Fraction(d))
-        if (above == -below).all():
-            fixed.append(above)
-        else:
-            inner += [above, below]
-    A, C = (np.array(part).reshape(-1, P.dim + 1) for part in (inner, fixed))
-    return A[:, :-1], A[:, -1], C[:, :-1], C[:, -1]
-
-
-def _row(row: Floats, side: Fraction) -> Floats:
-    """A row ``[a, b]``, multiplied by the denominator of b if it stays exact then, else b rounded up."""
-    scaled = row * float(side.denominator)
-    exact = [Fraction(v) for v in scaled.tolist()] == [Fraction(v) * side.denominator for v in row.tolist()]
-    if exact and float(side.numerator) == side.numerator:
-        return np.append(scaled, float(side.numerator))
-    return np.append(row, up(side))
+    sides = [Fraction(b) - h for b, h in zip(P.b.tolist(), supports[:k], strict=True)]
+    return with_sides(P.A, sides, P.C, [Fraction(d) - middle for d, middle in zip(P.d.tolist(), middles, strict=True)])

@@ -1,23 +1,45 @@
 """Redundancy removal: the rows without which the set would grow."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import kernel
-from polytopes.affine_hull import explicit
+from polytopes.affine_hull import implicit_equalities, independent_rows, made_explicit
 from polytopes.checks import Floats
-from polytopes.exact import rational, rational_matrix, rational_vector
+from polytopes.exact import rational, rational_vector
 from polytopes.exact_simplex import affordable
 from polytopes.frame import unit_body
 from polytopes.linear_program import Program
 from polytopes.preparation import prepare
-from polytopes.rows import Rows
+from polytopes.rows import Rows, Table, nothing
+from polytopes.shown import Shown
 from polytopes.support import known_nonempty
 
 Indices = NDArray[np.int64]
 
 
-def minimal_rows(P: Rows) -> tuple[Floats, Floats, Floats, Floats]:
+@dataclass(frozen=True, eq=False)
+class KeptRows(Shown):
+    """Numbers of the rows that describe a set minimally.
+
+    Attributes
+    ----------
+    inequalities : array of int
+        Rows of A, one for each facet.
+    equalities : array of int
+        Rows of C.
+    implicit : array of int
+        Rows of A that hold with equality all over the set, and are equalities of the minimal description.
+    """
+
+    inequalities: Indices
+    equalities: Indices
+    implicit: Indices
+
+
+def minimal_rows(P: Rows) -> Table:
     """Minimal description A, b, C, d of P: independent equalities, and one row per facet.
 
     Implicit equalities become explicit.  With c the centre of a largest ball, a row is dropped if the others keep it
@@ -26,21 +48,27 @@ def minimal_rows(P: Rows) -> tuple[Floats, Floats, Floats, Floats]:
     leaves open are decided in coordinates where P is about a unit ball, then in rationals.  The empty set is
     ``0'x <= -1``.
     """
-    n = P.dim
     if not known_nonempty(P):
-        return np.zeros((1, n)), np.array([-1.0]), np.empty((0, n)), np.empty(0)
-    flat = explicit(P)
-    rows = facets(flat.program)
-    independent = independent_rows(flat.C)
-    return flat.A[rows], flat.b[rows], flat.C[independent], flat.d[independent]
+        return nothing(P.dim)
+    kept = kept_rows(P)
+    rows, fixed, flat = kept.inequalities, kept.equalities, kept.implicit
+    return P.A[rows], P.b[rows], np.vstack([P.C[fixed], P.A[flat]]), np.append(P.d[fixed], P.b[flat])
 
 
-def independent_rows(C: Floats) -> list[int]:
-    """A largest set of exactly independent rows."""
-    if C.shape[0] == 0:
-        return []
-    reduced, rank = rational_matrix(np.ascontiguousarray(C.T)).rref()
-    return [next(j for j in range(C.shape[0]) if reduced[k, j] != 0) for k in range(rank)]
+def kept_rows(P: Rows) -> KeptRows:
+    """Numbers of the rows of a minimal description of a nonempty set.
+
+    Raises
+    ------
+    EmptySetError
+        If P is empty: no choice of its rows is minimal for sure.
+    """
+    implicit = np.array(implicit_equalities(P), dtype=np.int64)
+    flat = made_explicit(P, implicit.tolist()) if implicit.size else P
+    others = np.setdiff1d(np.arange(P.b.size), implicit)
+    independent = np.array(independent_rows(flat.C), dtype=np.int64)
+    own = independent < P.d.size
+    return KeptRows(others[facets(flat.program)], independent[own], implicit[independent[~own] - P.d.size])
 
 
 def facets(program: Program) -> Indices:

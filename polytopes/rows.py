@@ -1,7 +1,7 @@
 """The rows of an H-polytope: validated once, read-only, with what is derived from them kept beside them."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,7 @@ class Rows(Value):
     Parameters
     ----------
     A, b : array_like (m, n) and (m,)
+        A and C may be sparse; a row whose b is +inf bounds nothing and is left out.
     C, d : array_like (q, n) and (q,), optional
         Explicit equalities.
 
@@ -42,14 +43,18 @@ class Rows(Value):
     d: Floats
 
     def __init__(self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None) -> None:
-        rows = real_array("A", A, ("m", "n"))
+        rows = real_array("A", dense(A), ("m", "n"))
         m, n = rows.shape
         if n == 0:
             raise ValueError(f"A has shape {rows.shape}; expected at least one column. Use shape (0, n) for no rows.")
-        rhs = real_array("b", b, (m,), meaning="one entry per row of A")
+        rhs = real_array("b", b, (m,), meaning="one entry per row of A", finite=False)
+        if np.count_nonzero(np.isfinite(rhs)) < m:
+            rows, rhs = _bounding(rows, rhs)
         if (C is None) != (d is None):
             raise ValueError("C and d must be given together: the equalities are C x = d.")
-        fixed = np.empty((0, n)) if C is None else real_array("C", C, ("q", n), meaning="one column per column of A")
+        fixed = (
+            np.empty((0, n)) if C is None else real_array("C", dense(C), ("q", n), meaning="one column per column of A")
+        )
         values = np.empty(0) if d is None else real_array("d", d, (len(fixed),), meaning="one entry per row of C")
         for name, array in zip("AbCd", (rows, rhs, fixed, values), strict=True):
             array.flags.writeable = False
@@ -93,6 +98,19 @@ class Rows(Value):
     def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
         """The same equalities with other inequalities ``A x <= b``: A (m, n), b (m,)."""
         return type(self)(A, b, self.C, self.d)
+
+
+def dense(matrix: Any) -> Any:
+    """A sparse matrix of SciPy as an array; anything else as it is."""
+    return matrix.toarray() if hasattr(matrix, "toarray") else matrix
+
+
+def _bounding(A: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """The rows that bound something: those whose side is not +inf."""
+    if np.isneginf(b).any():
+        i = int(np.flatnonzero(np.isneginf(b))[0])
+        raise ValueError(f"b[{i}] is -inf, which no point keeps; expected a number, or +inf. Use HPolytope.empty(n).")
+    return A[np.isfinite(b)], b[np.isfinite(b)]
 
 
 def nothing(n: int) -> Table:

@@ -22,13 +22,15 @@ def options_by_name(item: Item) -> Item:
     every = [p for p in signature(function).parameters.values() if p.name != "self"]
     by_position = [p.name for p in every if p.kind is Parameter.POSITIONAL_OR_KEYWORD]
     options = ", ".join(f"{p.name}=..." for p in every if p.kind is Parameter.KEYWORD_ONLY)
-    most = len(by_position) + ("self" in signature(function).parameters)
-    called = item.__name__ if isclass(item) else item.__qualname__
+    name = item.__name__ if isclass(item) else item.__qualname__
+    bound = "self" in signature(function).parameters
+    most = len(by_position) + bound
 
     @wraps(function)
     def checked(*args: Any, **kwargs: Any) -> Any:
         if len(args) > most:
-            taken = ", ".join(name for name in by_position if name != "cls") or "nothing"
+            taken = ", ".join(given for given in by_position if given != "cls") or "nothing"
+            called = f"{type(args[0]).__name__}.{item.__name__}" if bound and not isclass(item) else name
             raise TypeError(f"{called} takes {taken} by position; give the rest by name: {options}")
         return function(*args, **kwargs)
 

@@ -115,6 +115,8 @@ CONSTANTS = (
     Constant("polytopes.hull", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.affine_image", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.preimage", "_EPS", "outward", f"{SETS}/test_outward.py"),
+    Constant("polytopes.inclusion", "_EPS", "outward", f"{SETS}/test_operators.py"),
+    Constant("polytopes.normalisation", "_EPS", "outward", f"{SETS}/test_operators.py"),
     Constant("core/polytopes/centre.c", "EPS", "outward", ROUNDED),
     Constant("svo.logs.columns", "TIME_TOLERANCE", "tolerance", "tests/svo/logs/test_log_file.py"),
     Constant("svo.isolation.containment", "_ROUNDING", "tolerance", "tests/svo/isolation/test_bank_of_kind_one.py"),

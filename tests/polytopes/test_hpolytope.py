@@ -14,7 +14,7 @@ from polytopes import HPolytope
         (([1.0, 2.0], [1.0]), r"A has shape \(2,\)"),
         (([[1.0, 2.0]], [1.0, 2.0]), r"b has shape \(2,\); expected \(1,\)"),
         (([[np.nan, 2.0]], [1.0]), "A contains NaN"),
-        (([[1.0, 2.0]], [np.inf]), "b contains an infinity"),
+        (([[1.0, 2.0]], [-np.inf]), r"b\[0\] is -inf"),
         (([[1.0, 2.0]], [1.0], [[1.0]], [1.0]), r"C has shape \(1, 1\); expected \(q, 2\)"),
         (([[1.0, 2.0]], [1.0], [[1.0, 1.0]], [1.0, 2.0]), r"d has shape \(2,\)"),
         (([[1.0, 2.0]], [1.0], [[1.0, 1.0]]), "C and d must be given together"),

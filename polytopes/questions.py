@@ -1,0 +1,216 @@
+"""What can be asked of a set: methods that check their arguments and call the operation on rows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polytopes import containment, sampling, separation
+from polytopes import support as support_functions
+from polytopes.affine_hull import affine_dim
+from polytopes.checks import Floats, real_array, real_number, whole_number
+from polytopes.containment import Containment
+from polytopes.emptiness import Emptiness
+from polytopes.generators import Generators, generators
+from polytopes.inner_box import inner_box
+from polytopes.redundancy import KeptRows, kept_rows
+from polytopes.rows import Rows, same_space
+from polytopes.separation import Intersects
+from polytopes.signatures import options_by_name
+from polytopes.support import Ball, SupportResult
+from polytopes.vertices import vertices
+from polytopes.volume import volume
+
+
+class Questions(Rows):
+    """Questions to a set."""
+
+    def emptiness(self) -> Emptiness:
+        """Is the set empty?  "nonempty" with a witness, "empty" with an exact certificate, or "undecided".
+
+        Decided about the floats as they are: rows that contradict each other only by rounding are empty, and a set of
+        width 1e-12 is not.  Microseconds where the set is fat or clearly empty, milliseconds of rational arithmetic
+        where it is neither.
+        """
+        return self.decided
+
+    def is_empty(self) -> bool:
+        """Whether the set has no point, as `emptiness` decides it.
+
+        Raises
+        ------
+        UndecidedError
+            If that could be neither proved nor refuted.
+        """
+        return not support_functions.known_nonempty(self)
+
+    def support(self, directions: ArrayLike) -> float | Floats:
+        """Support function ``h(c) = max {c'x : x in P}``; some microseconds a direction in a batch, 30 for a call.
+
+        Of a box a sum, without a program.
+
+        Parameters
+        ----------
+        directions : array_like (n,) or (k, n)
+
+        Returns
+        -------
+        float or array (k,)
+            +inf where unbounded, -inf if the set is empty.  Never below the exact value, and above it by rounding only
+            (some 1e-13 of the size of the set); equal to it where nothing is rounded: integers and short fractions.
+
+        Raises
+        ------
+        UndecidedError
+            If a program could not be settled.
+        """
+        return support_functions.support(self, directions)
+
+    def support_points(self, directions: ArrayLike) -> SupportResult:
+        """Values, maximisers and multipliers in k directions; see `SupportResult` and `support`."""
+        return support_functions.support_points(self, directions)
+
+    def bounding_box(self) -> tuple[Floats, Floats]:
+        """Smallest box that contains the set: lower (n,) and upper (n,), infinite where unbounded.
+
+        Rounded outward, as `support` is: every point of the set is in it.  2 n programs; of a box none.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        """
+        return support_functions.bounding_box(self)
+
+    def inner_box(self) -> tuple[Floats, Floats]:
+        """A largest box inside a bounded set: lower (n,) and upper (n,); it satisfies the rows to rounding.
+
+        First the largest one with the proportions of the bounding box (one linear program), then each face moved out
+        as far as it goes, so that no larger box contains it; of all boxes inside, it need not have the largest volume.
+
+        Raises
+        ------
+        EmptySetError, UnboundedError
+            If there is no such box.
+        """
+        return inner_box(self)
+
+    def chebyshev(self) -> Ball:
+        """A largest ball in the set (within the affine set of the equalities): centre and radius, inf if unlimited.
+
+        One linear program in n + 1 variables.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        """
+        return support_functions.chebyshev(self)
+
+    def is_bounded(self) -> bool:
+        """Whether the set lies in some ball; the empty set does.  2 n programs, of a box none."""
+        return support_functions.is_bounded(self)
+
+    def affine_dim(self) -> int:
+        """Dimension of the affine hull, decided exactly: 0 for a point, -1 for the empty set.
+
+        Free where a ball fits in; rational arithmetic (milliseconds) where the set is flat or thinner than 1e-9.
+        """
+        return affine_dim(self)
+
+    @options_by_name
+    def contains(self, x: ArrayLike | Rows, *, tol: float = 1e-9) -> bool | NDArray[np.bool_] | Containment:
+        """Whether a point (n,), each of k points (k, n), or a whole set lies inside.
+
+        Parameters
+        ----------
+        x : array_like or HPolytope
+        tol : float
+            Nonnegative distance, in the units of x: every half-space and hyperplane may be missed by that much.  The
+            test is in floats; with tol = 0 a point on the boundary may go either way (``x in P`` and ``Q <= P`` are
+            decided exactly).  A set costs one program a row.
+
+        Returns
+        -------
+        bool, array (k,) of bool, or Containment
+            For a set, true or false in an ``if``, with a point of it outside and the row that this breaks.
+        """
+        slack = real_number("tol", tol, least=0.0)
+        if isinstance(x, Rows):
+            return containment.contains_set(self, same_space(self, x), slack)
+        points = real_array("x", x, (self.dim,), ("k", self.dim))
+        inside = containment.contains_points(self, np.atleast_2d(points), slack)
+        return bool(inside[0]) if points.ndim == 1 else inside
+
+    def intersects(self, Q: Rows) -> Intersects:
+        """Whether this set and Q have a common point, decided exactly: true or false in an ``if``.
+
+        With a common point, or a plane between the sets whose proof ``verify(P, Q)`` checks in rationals.
+
+        Raises
+        ------
+        UndecidedError
+            If that could not be decided.
+        """
+        return separation.intersects(self, same_space(self, Q))
+
+    @options_by_name
+    def equals(self, Q: Rows, *, tol: float = 1e-9) -> bool:
+        """Whether this set and Q contain each other within `tol` (see `contains`)."""
+        return containment.equal_sets(self, same_space(self, Q), real_number("tol", tol, least=0.0))
+
+    def minimal_rows(self) -> KeptRows:
+        """Numbers of the rows that `remove_redundancy` keeps: facets, equalities, and inequalities that became such.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        """
+        return kept_rows(self)
+
+    def vertices(self) -> Floats:
+        """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
+
+        In integers where the rows are short, or the set is flat or thin (and its vertices not too many), each rounded
+        to the nearest floats.  Else Qhull on the dual of the minimal rows, then each vertex from its rows again;
+        corners closer than 1e-9 of the size are one.  The number of vertices, and the cost, grow as m^(n/2).
+
+        Raises
+        ------
+        UnboundedError
+            If the set is unbounded.
+        UndecidedError
+            If the set is too thin for vertices in floats (below 1e-14 of its size).
+        """
+        return vertices(self)
+
+    def generators(self) -> Generators:
+        """Vertices, rays and lines of a nonempty set, bounded or not; see `Generators`.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        UndecidedError
+            If it is unbounded and the double description passes 10 000 rays.
+        """
+        return generators(self)
+
+    def volume(self) -> float:
+        """n-dimensional volume: 0 for flat and empty sets, inf for unbounded full-dimensional ones (as `vertices`)."""
+        return volume(self)
+
+    def random_points(self, count: int, rng: np.random.Generator) -> Floats:
+        """Points (count, n) of a bounded set, close to uniform: hit-and-run, 20 n steps of O(m n) between two points.
+
+        `rng` is a `numpy.random.Generator`.
+
+        Raises
+        ------
+        EmptySetError, UnboundedError
+            If there are no points, or no uniform distribution on them.
+        """
+        if not isinstance(rng, np.random.Generator):
+            raise TypeError(f"rng is a {type(rng).__name__}; expected a numpy.random.Generator: default_rng(seed).")
+        return sampling.random_points(self, whole_number("count", count, least=0), rng)
