@@ -12,6 +12,7 @@ from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models import ModelSample
+from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
 from svo.observers.window.chain import promises_of, prover_of, proving, start_of
@@ -63,12 +64,17 @@ class PlantModels:
         """How an alarm's matrices differ; where they do not, only sizes, sampling time and options can."""
         claimed = alarm.certificate.model_data()
         first = alarm.sample + 1 - len(claimed)
-        right = [ModelSample.of(observer.model, self.log.schedule_at(first + i)) for i in range(len(claimed))]
+        right = [self._sample(observer, k, alarm.sample) for k in range(first, first + len(claimed))]
         for k, (mine, its) in enumerate(zip(claimed, right, strict=True), start=first):
             what = mine.difference(its)
             if what is not None:
                 return f"the {what} of sample {k} differs from that of the plant's model {alarm.observer!r}"
         return None
+
+    def _sample(self, observer: Observer, k: int, last: int) -> ModelSample:
+        """Matrices and bounds at sample k, with the transition to the next one, where a proof goes on to it."""
+        dt = self.log.interval_at(k + 1, observer.Ts) if k < last else None
+        return ModelSample.of(observer.model, self.log.schedule_at(k), interval_of(observer.model, dt))
 
 
 def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:

@@ -62,6 +62,11 @@ class Bank(Shown, ABC):
         labels = Labels.of(self.observers[NOMINAL].model)
         return picture_of_sets(sets, self.names, labels.state_titles[:2])
 
+    @property
+    def Ts(self) -> float:
+        """Sampling time of the models [s]."""
+        return self.observers[NOMINAL].Ts
+
     # -- samples -----------------------------------------------------------------------------------
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Verdict:
@@ -94,6 +99,7 @@ class Bank(Shown, ABC):
         u_next: ArrayLike | None = None,
         schedule: Any = None,
         deadline: float | None = None,
+        dt: float | None = None,
     ) -> Verdict:
         """One transition driven by u, then the measurement y; arguments as for the observers.
 
@@ -112,6 +118,8 @@ class Bank(Shown, ABC):
             share of what is left; one that is done early leaves its time to those behind it. Sets may be wider and
             verdicts "undecided" then, never wrong, and results depend on the machine's speed. Not cut short are the
             exact proof of an alarm and, at the samples at which observers start again, their first programs.
+        dt : float, optional
+            Seconds from the sample before to this one; by default the models' ``Ts``.
 
         Raises
         ------
@@ -123,9 +131,9 @@ class Bank(Shown, ABC):
         """
         if self._sample is None:
             raise ValueError("step was called before the first measurement; call update(y0=...), NaN if there is none")
-        now = Sample.given(u, y, u_next, schedule)
+        now = Sample.given(u, y, u_next, schedule, dt)
         if deadline is None:
-            steps = self._ask(lambda name: self._running[name].step(now.u, now.y, u_next=now.u_next, schedule=schedule))
+            steps = self._ask(lambda name: now.to(self._running[name], now.y))
         else:
             steps = self._timed_steps(now, deadline)
         return self._conclude(self._sample + 1, steps, now)
@@ -316,7 +324,8 @@ class Bank(Shown, ABC):
             count = max(count, 1)
             k += count
             steps = {front.name: front.take(count) for front in running}
-            now = Sample.given(log.u[k - 2] if k > 1 else None, log.y[k - 1], log.u[k - 1], log.schedule_at(k - 1))
+            before, dt = log.u[k - 2] if k > 1 else None, log.interval_at(k - 1, self.Ts)
+            now = Sample.given(before, log.y[k - 1], log.u[k - 1], log.schedule_at(k - 1), dt)
             yield self._conclude((-1 if self._sample is None else self._sample) + count, steps, now), count
 
     def _boxes_of(self, log: Log) -> Callable[[], dict[str, tuple[Array, Array]]]:
@@ -383,7 +392,7 @@ class Bank(Shown, ABC):
 
         def timed(name: str) -> Step:
             share = max(0.0, end - perf_counter()) / next(left)
-            return self._running[name].step(now.u, now.y, u_next=now.u_next, schedule=now.schedule, deadline=share)
+            return now.to(self._running[name], now.y, deadline=share)
 
         return self._ask(timed)
 
@@ -409,7 +418,7 @@ class Bank(Shown, ABC):
         self._sample: int | None = None
         self._refused_by = None
         self._largest_at: int | None = None  # what the set that observers start from rests on
-        self._latest = Sample(None, self._nothing(), None, None)
+        self._latest = Sample(None, self._nothing(), None)
         self._adopt(self._logic.initial())
 
     @property
@@ -483,7 +492,7 @@ class Bank(Shown, ABC):
         if now is self._latest:
             return self._start_from(name, set, now, largest_at=largest_at)
         self._start_from(name, set, self._latest, largest_at=None if largest_at is None else largest_at + 1)
-        return self.observers[name].step(now.u, self._nothing(), u_next=now.u_next, schedule=now.schedule)
+        return now.to(self.observers[name], self._nothing())
 
     def _nothing(self) -> ArrayLike:
         return np.full(self.observers[NOMINAL].model.n_outputs, np.nan)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from svo.checks import real_array
 from svo.isolation.logic import LogicState, Tally
 from svo.models.digest import canonical
-from svo.observers.base import Observer
+from svo.observers.base import Observer, Step
 from svo.observers.saved_state import digest_of_arrays
 
 State = dict[str, NDArray[Any]]
@@ -31,18 +31,27 @@ class Sample:
     u: ArrayLike | None
     y: ArrayLike
     u_next: ArrayLike | None
-    schedule: Any
+    schedule: Any = None
+    dt: float | None = None
 
     @classmethod
-    def given(cls, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any) -> Sample:
+    def given(
+        cls, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any, dt: float | None = None
+    ) -> Sample:
         """Copies of what a user hands over, whose arrays may hold the next sample when these are needed again."""
         before = None if u is None else real_array("u", u, finite=False)
         after = None if u_next is None else real_array("u_next", u_next, finite=False)
-        return cls(before, real_array("y", y, finite=False, missing=True), after, schedule)
+        return cls(before, real_array("y", y, finite=False, missing=True), after, schedule, dt)
+
+    def to(self, observer: Observer, y: ArrayLike, **options: Any) -> Step:
+        """The answer of an observer to this sample with a measurement (ny,)."""
+        if self.dt is not None:
+            options["dt"] = self.dt
+        return observer.step(self.u, y, u_next=self.u_next, schedule=self.schedule, **options)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """Those that are given, by name."""
-        given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule")}
+        given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule", "dt")}
         try:
             return {name: real_array(name, v, finite=False, missing=True) for name, v in given.items() if v is not None}
         except (TypeError, ValueError) as error:
@@ -51,10 +60,11 @@ class Sample:
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Sample:
         """What `arrays` gave; numbers are numbers again."""
-        u, y, u_next, schedule = (arrays.get(name) for name in ("u", "y", "u_next", "schedule"))
+        u, y, u_next, schedule, dt = (arrays.get(name) for name in ("u", "y", "u_next", "schedule", "dt"))
         if y is None:
             raise ValueError("y is missing")
-        return cls(u, y, u_next, float(schedule) if schedule is not None and schedule.ndim == 0 else schedule)
+        value = float(schedule) if schedule is not None and schedule.ndim == 0 else schedule
+        return cls(u, y, u_next, value, None if dt is None else float(dt))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,10 @@ class Driven(Protocol[Answer_co]):
 
     @property
     def step(self) -> Callable[..., Answer_co]:
-        """Called as step(u, y, u_next=None, schedule=None): one transition driven by u, then the measurement y."""
+        """Called as step(u, y, u_next=None, schedule=None): one transition driven by u, then the measurement y.
+
+        With dt=... too, the seconds of the transition, where a log keeps its own times.
+        """
         ...
 
 
@@ -81,4 +84,17 @@ def drive(
 
 def advance_to(driven: Driven[Answer], log: Log, k: int, schedule: Any, **options: Any) -> Answer:
     """The answer at sample k of a log."""
+    dt = _interval(driven, log, k)
+    if dt is not None:
+        options = {**options, "dt": dt}
     return advance(driven, log.u[k - 1] if k else None, log.y[k], log.u[k], schedule, **options)
+
+
+def _interval(driven: Driven[Answer], log: Log, k: int) -> float | None:
+    """Seconds from sample k - 1 to k of a log that keeps its own times; None where that is the sampling time."""
+    Ts = getattr(driven, "Ts", None)
+    if isinstance(Ts, float):
+        return log.interval_at(k, Ts)
+    if log.events:
+        raise TypeError(f"{type(driven).__name__} takes no log that keeps its own times (Log.events); resample it")
+    return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from polytopes.shown import Picture, Shown, counted, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect_kind, expect_shape, readings, real_array, sizes
 from svo.logs import frames
-from svo.logs.columns import checked_parts
+from svo.logs.columns import checked_parts, is_sampled
 from svo.logs.names import Columns
 from svo.pictures.timeline import Panel, Timeline
 
@@ -36,6 +37,9 @@ class Log(Shown):
         Scheduling value at each sample; None for plants without one.
     source : str, optional
         Where it comes from, such as the name of its file: stored with the alarms that it raises.
+    events : bool, optional
+        Whether each transition takes the time between its stamps (True), or the model's sampling time (False). By
+        default the former where one of them is off the latter by more than 1 %.
     widening : (ny,) array, optional
         By what the bound of each sensor's noise is wider on this log than in the model, half-widths in its unit: the
         price of readings that were moved in time, and of numbers that were rounded. `svo.detect` adds it.
@@ -48,6 +52,7 @@ class Log(Shown):
     x: Array | None = None
     schedule: Array | None = None
     source: str | None = None
+    events: bool | None = None
     widening: Array | None = None
 
     def __post_init__(self) -> None:
@@ -91,6 +96,22 @@ class Log(Shown):
             return None
         value = self.schedule[k]
         return float(value) if value.ndim == 0 else value
+
+    def keeps_its_times(self, Ts: float) -> bool:
+        """Whether a transition takes the time between its stamps, for models with the sampling time ``Ts``."""
+        if self.events is None:
+            least, most = self._steps
+            return not (is_sampled(0.0, least, Ts) and is_sampled(0.0, most, Ts))
+        return self.events
+
+    def interval_at(self, k: int, Ts: float) -> float | None:
+        """Seconds from sample k - 1 to k; None where that is the sampling time ``Ts``, or k the first sample."""
+        return float(self.time[k] - self.time[k - 1]) if k > 0 and self.keeps_its_times(Ts) else None
+
+    @cached_property
+    def _steps(self) -> tuple[float, float]:
+        steps = np.diff(self.time)
+        return float(steps.min(initial=np.inf)), float(steps.max(initial=-np.inf))
 
     # -- other forms -----------------------------------------------------------------------------
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from polytopes.shown import Shown
 from svo.checks import Array
+from svo.models.intervals import transition_rows
 from svo.models.model import UncertainModel
 from svo.models.nonlinear import NonlinearModel
 from svo.store.values import encode_value
@@ -43,10 +44,13 @@ class ModelSample(Shown):
     w: tuple[Array, Array] | None
 
     @classmethod
-    def of(cls, model: UncertainModel, schedule: Any) -> ModelSample:
-        """Those of a model at a scheduling value."""
-        lower, upper, noise = model.bounds(schedule)
-        return cls(model.stack(schedule), noise, (lower, upper))
+    def of(cls, model: UncertainModel, schedule: Any, dt: float | None = None) -> ModelSample:
+        """Those of a model at a scheduling value, with a transition that takes ``dt`` seconds; None = its ``Ts``."""
+        (lower, upper, noise), stack = model.bounds(schedule), model.stack(schedule)
+        if dt is not None:
+            rows = transition_rows(model, dt)
+            stack = np.concatenate([rows, stack[:, rows.shape[1] :]], axis=1)
+        return cls(stack, noise, (lower, upper))
 
     def difference(self, right: ModelSample) -> str | None:
         """What differs from the right matrices and bounds in any bit, or None; w only where this sample has it."""

@@ -129,6 +129,10 @@ class NormalForm(Shown):
         """A measurement in normal form."""
         return _scaled(y, self._per_y)
 
+    def state_rows(self, rows: Array) -> Array:
+        """The state rows (items, n, columns) of a stack in normal form."""
+        return rows * self.exponents.factor[: rows.shape[1]]
+
     def state_dict(self) -> dict[str, Integers]:
         """The exponents as named arrays."""
         return {f"exponents.{f.name}": getattr(self.exponents, f.name).copy() for f in fields(Exponents)}

@@ -54,6 +54,21 @@ class Origin(Shown):
         vary = vary_in(self.plant, self.varying)
         return replace(_discretised(self.plant, self._width(vary), vary), origin=self)
 
+    def over(self, dt: float) -> Plant:
+        """The discrete model of transitions that take ``dt`` seconds.
+
+        Raises
+        ------
+        ValueError
+            If ``remainder`` is in numbers, which are of the sampling time.
+        """
+        if self.remainder is not None and not isinstance(self.remainder, Mapping):
+            raise ValueError(
+                f"dt is {dt:g} s, and remainder is given in numbers, which are of the sampling time "
+                f"{self.plant.Ts:g} s; give remainder = {{'states': ..., 'inputs': ...}}, from which it is computed"
+            )
+        return replace(self, plant=replace(self.plant, Ts=dt)).model()
+
     def after(self, changes: Mapping[str, Any]) -> Origin:
         """The origin of the discrete model once some of its arguments were replaced."""
         if not changes.keys() <= _ALIKE_IN_BOTH_TIMES:

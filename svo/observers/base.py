@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from time import perf_counter
 from typing import Any, ClassVar, Self
@@ -23,6 +24,7 @@ from svo.checks import Array, is_count
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models import Labels, UncertainModel, expect_model
+from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.answers import Seen, Step, VerdictName
 from svo.observers.certificate import Certificate
@@ -67,6 +69,8 @@ class Observer(Shown, ABC):
         Whether it can be saved and go on: `_options`, `_state`, `_set_up` and `_resume` are defined.
     starts_without_set : bool
         Whether it can start with nothing known of the state: `_lose_set` is defined.
+    takes_intervals : bool
+        Whether a transition may take another time than the sampling time: `_set_interval` is defined.
     takes_nonlinear : bool
         Whether its model may be a `NonlinearModel`.
     largest_at : int or None
@@ -78,6 +82,7 @@ class Observer(Shown, ABC):
     takes_late: ClassVar[bool] = False
     saves_state: ClassVar[bool] = False
     starts_without_set: ClassVar[bool] = False
+    takes_intervals: ClassVar[bool] = False
     takes_nonlinear: ClassVar[bool] = False
 
     model: UncertainModel
@@ -107,6 +112,11 @@ class Observer(Shown, ABC):
         return newest._picture() if newest is not None and newest.sample == self._number else None
 
     # -- samples -----------------------------------------------------------------------------------
+
+    @property
+    def Ts(self) -> float:
+        """Sampling time of the model [s]."""
+        return self.model.Ts
 
     @property
     def needs_next_input(self) -> bool:
@@ -179,6 +189,7 @@ class Observer(Shown, ABC):
         u_next: ArrayLike | None = None,
         schedule: Any = None,
         deadline: float | None = None,
+        dt: float | None = None,
     ) -> Step:
         """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
 
@@ -197,13 +208,17 @@ class Observer(Shown, ABC):
             contains the state, and the verdict is "undecided" if emptiness could not be decided. What is left
             then takes a few microseconds a direction. The exact proof of an alarm, a few milliseconds once, is
             not cut short. Results depend on the machine's speed. Only where `takes_deadline`.
+        dt : float, optional
+            Seconds from k to k + 1; by default the model's ``Ts``. Of a model in continuous time (by
+            `UncertainModel.from_continuous`, or a `NonlinearModel`) any number above zero, for which the transition is
+            discretised; of one in discrete time ``Ts`` within 1 %. Only where `takes_intervals`.
 
         Raises
         ------
         TypeError, ValueError
             For a wrong shape, an infinite or missing value, a schedule that gives no finite matrices, a scheduled
-            model whose first call is not `update`, or a deadline that the observer does not take. The observer is
-            unchanged.
+            model whose first call is not `update`, or a deadline or dt that observer or model do not take. The observer
+            is unchanged.
         """
         begun = perf_counter()
         if deadline is not None:
@@ -213,15 +228,21 @@ class Observer(Shown, ABC):
         following = inputs_of(self.model, "u_next", u_next, self.needs_next_input)
         outputs = outputs_of(self.model, y)
         check_schedule(self.model, schedule)
+        interval = interval_of(self.model, dt)
+        if interval is not None:
+            self._check_can(self.takes_intervals, "takes only transitions of the model's Ts: leave dt out")
         if self._alarm is not None:
             return replace(self._alarm, seconds=perf_counter() - begun)
         if self._number < 0:
             check_may_start_by_step(self.model)
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
-        return self._ask(begun, schedule, lambda: self._step(inputs, outputs, following, schedule, deadline))
+        with self._taking(interval):
+            return self._ask(begun, schedule, lambda: self._step(inputs, outputs, following, schedule, deadline))
 
     def run(self, log: Log) -> Record:
         """All samples of a log, with the box of the state at each.
+
+        A log that keeps its own times (`svo.Log.events`) has each transition discretised for its own interval.
 
         Raises
         ------
@@ -396,6 +417,10 @@ class Observer(Shown, ABC):
         """A late measurement of a sample of the window; the answer is about the newest sample."""
         raise NotImplementedError
 
+    def _set_interval(self, dt: float | None) -> None:
+        """The next transition takes ``dt`` seconds; None: the model's ``Ts``."""
+        raise NotImplementedError
+
     def _lose_set(self) -> None:
         """Start with nothing known but the model's ranges."""
         raise NotImplementedError
@@ -433,6 +458,18 @@ class Observer(Shown, ABC):
             raise
         self._schedule = schedule
         return self._answered(step, begun, stopped)
+
+    @contextmanager
+    def _taking(self, interval: float | None) -> Iterator[None]:
+        """While the transition of an interval is taken, which is that of Ts again if it is refused."""
+        if interval is not None:
+            self._set_interval(interval)
+        try:
+            yield
+        except BaseException:
+            if interval is not None:
+                self._set_interval(None)
+            raise
 
     def _answered(self, step: Step, begun: float, stopped: int) -> Step:
         # nobody has seen it yet, and a copy takes a twentieth of a fast observer's time

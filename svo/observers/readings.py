@@ -64,6 +64,13 @@ class Readings:
             old = self.samples[-1 - age]
             self.samples[-1 - age] = usable(old._replace(y=np.where(np.isnan(y), old.y, y)))
 
+    def move_by(self, rows: Array) -> None:
+        """Replace the transition from the newest sample by that of state rows (items, n, columns)."""
+        if self.samples:
+            stack = self.samples[-1].stack.copy()
+            stack[:, : self._n] = rows
+            self.samples[-1] = self.samples[-1]._replace(stack=stack)
+
     def start(self) -> tuple[list[Reading], Array, Array] | None:
         """The samples from the first reading on and bounds of the state there, once there are any of use."""
         if not self.samples or np.isnan(self.samples[-1].y).all():

@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from svo.checks import Array
 from svo.models import NormalForm, UncertainModel
+from svo.models.intervals import transition_rows
 from svo.models.state_range import within
 from svo.observers.answers import Step
 from svo.observers.base import Observer
@@ -25,7 +26,7 @@ Data = TypeVar("Data")
 class RecursiveObserver(Observer, Generic[Data]):
     """Hooks of a set that is kept from sample to sample; ``Data`` are model and data of a sample."""
 
-    starts_without_set = True
+    starts_without_set = takes_intervals = True
 
     _form: NormalForm
     _normal: UncertainModel
@@ -62,6 +63,10 @@ class RecursiveObserver(Observer, Generic[Data]):
         """The next sample; None if the set has outgrown all bounds."""
 
     @abstractmethod
+    def _move_by(self, rows: Array) -> None:
+        """Replace the transition from the newest sample of a set by that of state rows (items, n, columns)."""
+
+    @abstractmethod
     def _unknown(self) -> Step:
         """The answer without a set."""
 
@@ -78,6 +83,13 @@ class RecursiveObserver(Observer, Generic[Data]):
         if self._readings is not None:
             return self._without_set(driven, data)
         return self._go_on(driven, data) or self._give_up(driven, data)
+
+    def _set_interval(self, dt: float | None) -> None:
+        rows = self._form.state_rows(transition_rows(self.model, dt))
+        if self._readings is not None:
+            self._readings.move_by(rows)
+        else:
+            self._move_by(rows)
 
     # -- a set that is lost ------------------------------------------------------------------------
 

@@ -254,6 +254,13 @@ class PolytopeObserver(RecursiveObserver[Sample]):
                 raise
             return None
 
+    def _move_by(self, rows: Array) -> None:
+        assert self._last is not None
+        sample, outcome = self._last
+        stack = sample.stack.copy()
+        stack[:, : self._normal.n_states] = rows
+        self._last = sample._replace(stack=stack), outcome
+
     def _unknown(self) -> PolytopeStep:
         joint = anywhere(self._normal.n_states, self._normal.physical_range)
         return PolytopeStep(joint, self._form, verdict="undecided", reason=OUTGROWN)

@@ -19,6 +19,7 @@ from svo.checks import Array, expect, is_count
 from svo.logs.drive import advance_to
 from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel
+from svo.models.intervals import check_splits, transition_rows
 from svo.models.nonlinear import NonlinearModel, Span, Undecided
 from svo.models.state_range import within
 from svo.observers.answers import VerdictName
@@ -83,7 +84,7 @@ class WindowObserver(Observer):
     """
 
     kind = "window"
-    takes_deadline = takes_late = saves_state = starts_without_set = takes_nonlinear = True
+    takes_deadline = takes_late = saves_state = starts_without_set = takes_intervals = takes_nonlinear = True
 
     @options_by_name
     def __init__(
@@ -207,6 +208,21 @@ class WindowObserver(Observer):
             self._relinearise(self._plant, u)
         return self._said(self._take(self._sample(u, u_next, y, schedule), end))
 
+    def _set_interval(self, dt: float | None) -> None:
+        if self._plant is not None:
+            self._plant.dt = dt
+            return
+        check_splits(self.model)
+        if self._settings.injection is not None:
+            raise ValueError(
+                "dt is given, and exact sensors read every disturbance, which the observer takes out of its program "
+                "(output injection) for transitions of Ts only; state a noise n above zero"
+            )
+        rows = self._form.state_rows(transition_rows(self.model, dt))
+        self._window.move_by(rows)
+        if self._readings is not None:
+            self._readings.move_by(rows)
+
     @property
     def _oldest(self) -> int:
         if self._lost:
@@ -311,7 +327,7 @@ class WindowObserver(Observer):
     def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | None:
         """Samples of a log for one call of the kernel; None where the next one needs more than that."""
         gone = self._lost or self._alarm is not None or self._readings is not None or self._missing.any()
-        if gone or self._plant is not None:
+        if gone or self._plant is not None or log.keeps_its_times(self.Ts):
             return None
         last = min(first + min(count, self._window.takes_at_once), len(log))
         return log_samples(self._form, log, first, last, self._wants_next_input)
@@ -371,11 +387,12 @@ class WindowObserver(Observer):
     def _relinearise(self, plant: Relinearised, u: Array) -> None:
         """Hand over the transition from the newest sample; where there is none, the set starts again."""
         n = self.model.n_states
+        dt, plant.dt = plant.dt, None
         try:
             if self._lost:
                 raise Undecided(OUTGROWN)
             lower, upper = self._newest_bounds(self._window)
-            at = plant.moved(Span(lower[:n] * self._form.x, upper[:n] * self._form.x), u)
+            at = plant.moved(Span(lower[:n] * self._form.x, upper[:n] * self._form.x), u, dt)
         except Undecided as error:
             box = plant.give_up(error, self._number)
             self._adopt(
@@ -383,7 +400,7 @@ class WindowObserver(Observer):
             )
             self.largest_at = self._number
         else:
-            self._window.move_by(self._normal.stack(at))
+            self._window.move_by(self._normal.stack(at)[:, :n])
 
     def _said(self, verdict: VerdictName) -> WindowStep:
         reason = (OUTGROWN if self._lost else self._window.reason) if verdict == "undecided" else None

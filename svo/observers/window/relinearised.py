@@ -37,21 +37,26 @@ class Relinearised:
         Known of the newest state besides what the window knows.
     reason : str or None
         Why the newest sample was not linearised.
+    dt : float or None
+        Seconds that the next transition is to take; None = the model's ``Ts``.
     """
 
     def __init__(self, model: NonlinearModel) -> None:
-        self.model, self.reason = model, None
+        self.model, self.reason, self.dt = model, None, None
         self.start_from(Span(model.start_range.lower, model.start_range.upper))
         self._now: Linearisation | None = None
 
     reason: str | None
+    dt: float | None
 
     def start_from(self, box: Span) -> None:
         """Nothing is known of the newest state but a box."""
         self.box = box
 
-    def moved(self, known: Span, u: Array) -> Linearisation:
+    def moved(self, known: Span, u: Array, dt: float | None) -> Linearisation:
         """The newest sample with the transition from it, whose states are in a box that the window knows.
+
+        It takes ``dt`` seconds; None = the model's ``Ts``.
 
         Raises
         ------
@@ -63,7 +68,7 @@ class Relinearised:
         if not (lower <= upper).all():  # only the window's programs raise an alarm
             lower, upper = known
         assert self._now is not None
-        found = self.model.transition(lower, upper, u)
+        found = self.model.transition(lower, upper, u, dt=dt)
         self.box = found.box
         return self._now.moved(found)
 

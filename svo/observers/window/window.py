@@ -178,10 +178,23 @@ class Window:
             return _NO_END
         return memory.size.N - memory.time - 1 if memory.started else memory.size.N
 
-    def move_by(self, stack: Array) -> None:
-        """Replace the transition from the newest sample, which is read at the next one, by that of a stack."""
-        n = self._model.n_states
-        self.memory.arrays["stack"][self.memory.slot, 0, :n] = stack[0, :n]
+    def move_by(self, rows: Array) -> None:
+        """Replace the transition from the newest sample, which is read at the next one, by that of state rows.
+
+        Those (items, n, columns) of uncertainties belong to channels that do not reach the output
+        (`svo.models.intervals.check_splits`), or are as they were.
+        """
+        memory, arrays = self.memory, self.memory.arrays
+        if not memory.started:
+            return
+        stack = arrays["stack"][memory.slot]
+        stack[:, : self._model.n_states] = rows
+        if memory.size.late and memory.size.nq:
+            v = memory.variables
+            gain, functional, left, complete = kernel.channel_factors(stack, arrays["owner"], arrays["delta"])
+            check_entry(kernel.FINE if complete else kernel.RANK_ROSE)
+            arrays["gain"][v], arrays["functional"][v], arrays["left"][v] = gain, functional, left
+            arrays["is_left"][v] = left.any()
 
     def add_late(self, y: Array, sample: int) -> VerdictName:
         """A measurement of a sample that is still there."""

@@ -14,6 +14,7 @@ from polytopes import HPolytope
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
 from svo.models import NormalForm, UncertainModel
+from svo.models.intervals import check_splits
 from svo.observers.answers import VerdictName
 from svo.observers.data import relative_slack, stack_at
 from svo.observers.first_states import first_box
@@ -201,6 +202,13 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
                 return None
             now = self._builder.measured(states, data)
         return self._conclude((before,), now, states) if now.joint.within(np.inf) else None
+
+    def _set_interval(self, dt: float | None) -> None:
+        check_splits(self.model)
+        super()._set_interval(dt)
+
+    def _move_by(self, rows: Array) -> None:
+        self._stages = (*self._stages[:-1], self._builder.moved(self._stages[-1], rows))
 
     def _unknown(self) -> ZonotopeStep:
         return self._answer("undecided", None, None)

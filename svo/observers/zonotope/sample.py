@@ -103,15 +103,26 @@ class StageBuilder:
 
     def measured(self, states: ConstrainedZonotope, data: WindowSample) -> Stage:
         """A set of states and the measurement of its sample."""
-        gains, functionals, left, complete = channel_factors(data.stack, self._owner, self._delta)
-        if not complete:
-            raise ValueError("an uncertainty has a higher rank at this sample than at the model's typical schedule")
+        gains, functionals, left = self._factors(data.stack)
         nowhere = np.full(self.model.n_outputs, NO_ROW)
         stage = Stage(states, states, data, gains, functionals, left, nowhere, np.full(len(data.on_w), NO_ROW))
         if not self.is_late:
             return self._measure(stage)
         reaching = np.any(gains[:, self.model.n_states :], axis=1)
         return self._measure(self._with_channels(self._with_disturbance(stage), reaching))
+
+    def moved(self, stage: Stage, rows: Array) -> Stage:
+        """A stage whose state rows (items, n, columns) are others: nothing of the measurement depends on them."""
+        stack = stage.data.stack.copy()
+        stack[:, : self.model.n_states] = rows
+        gains, functionals, left = self._factors(stack)
+        return replace(stage, data=replace(stage.data, stack=stack), gains=gains, functionals=functionals, left=left)
+
+    def _factors(self, stack: Array) -> tuple[Array, Array, Array]:
+        gains, functionals, left, complete = channel_factors(stack, self._owner, self._delta)
+        if not complete:
+            raise ValueError("an uncertainty has a higher rank at this sample than at the model's typical schedule")
+        return gains, functionals, left
 
     def _with_disturbance(self, stage: Stage) -> Stage:
         """With w of the sample."""
