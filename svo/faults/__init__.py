@@ -2,9 +2,11 @@
 
 from svo.faults.actuator import ActuatorFault, ActuatorLaw
 from svo.faults.pair import FaultPair, pairs
+from svo.faults.parameter import ParameterFault
 from svo.faults.plant import PlantFault
 from svo.faults.profiles import Exponential, Intermittent, Profile, Ramp, Step
 from svo.faults.sensor import SensorFault, SensorLaw
+from svo.faults.simulation import simulate_fault
 
 __all__ = [
     "ActuatorFault",
@@ -12,6 +14,7 @@ __all__ = [
     "Exponential",
     "FaultPair",
     "Intermittent",
+    "ParameterFault",
     "PlantFault",
     "Profile",
     "Ramp",
@@ -19,4 +22,5 @@ __all__ = [
     "SensorLaw",
     "Step",
     "pairs",
+    "simulate_fault",
 ]

@@ -20,8 +20,10 @@ from svo.faults.blocks import (
     with_new_disturbances,
     without_columns,
 )
+from svo.faults.equations import Model, rewritten, unchanged, with_inputs
 from svo.faults.profiles import EDGE_TOLERANCE_S, Profile, Step, at_times, check_profile
 from svo.models import UncertainModel, Uncertainty
+from svo.models.nonlinear import NonlinearModel
 
 ActuatorKind = Literal[
     "loss", "locking", "hard-over", "runaway", "floating", "oscillatory-solid", "oscillatory-liquid", "noise"
@@ -217,9 +219,35 @@ class ActuatorFault(Shown):
 
     # -- the observer's model ----------------------------------------------------------------------
 
-    def model(self, nominal: UncertainModel) -> UncertainModel:
-        """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+    def model(self, nominal: Model) -> Model:
+        """The observer's model of this fault; it contains ``nominal`` and every intermediate size.
+
+        Delta is a parameter of a nonlinear model, and v a disturbance.
+        """
+        if isinstance(nominal, NonlinearModel):
+            return self._equations(nominal)
         return nominal.in_given_time(self._model)
+
+    def _equations(self, nominal: NonlinearModel) -> NonlinearModel:
+        where = channels(self.where, nominal.n_inputs, "inputs in the model")
+        called = [f"{self.kind} of {nominal.inputs[i]}" for i in where]
+        is_unknown = self.kind in (*_NEEDS_TRAVEL, "oscillatory-liquid", "oscillatory-solid", "noise")
+        is_scaled = self.kind in ("loss", "floating", "hard-over", "oscillatory-solid")
+
+        def achieved(u: list[Any], v: Any, d: Any) -> None:
+            for count, i in enumerate(where):
+                if not is_scaled:
+                    u[i] = v[count] + (0.0 if self.kind in _NEEDS_TRAVEL else u[i])
+                else:
+                    target = v[count] if is_unknown else self._size if self.kind == "hard-over" else 0.0
+                    u[i] = u[i] + d[0] * (target - u[i])
+
+        law, ends = with_inputs(achieved), self.travel or (-(self.magnitude or 0.0), self.magnitude or 0.0)
+        sizes = {f"share of {self.kind} of {self._called(nominal)}": (0.0, self._size if self.kind == "loss" else 1.0)}
+        return rewritten(
+            nominal, dynamics=law, outputs=law if nominal.uses_input_in_output else unchanged,
+            disturbances=dict.fromkeys(called, ends) if is_unknown else {}, parameters=sizes if is_scaled else {},
+        )  # fmt: skip
 
     def _model(self, nominal: UncertainModel) -> UncertainModel:
         channels(self.where, nominal.n_inputs, "inputs in the model")
@@ -298,7 +326,7 @@ class ActuatorFault(Shown):
         new = [f"{self.kind} of {inputs[channel]}" for channel in channels(self.where)]
         return {**{k: list(v) for k, v in nominal.names.items()}, "disturbances": [*own, *new]}
 
-    def _called(self, nominal: UncertainModel) -> str:
+    def _called(self, nominal: UncertainModel | NonlinearModel) -> str:
         inputs = (nominal.names or {}).get("inputs")
         return f"actuator {self.where}" if inputs is None else ", ".join(inputs[i] for i in channels(self.where))
 

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 
 from polytopes.shown import Shown
 from svo.checks import Array, expect, expect_kind, finite_array, is_finite_number
+from svo.faults.equations import Model, rewritten, with_terms
 from svo.faults.profiles import Profile, check_profile
 from svo.models import UncertainModel, Uncertainty
+from svo.models.nonlinear import NonlinearModel
 
 
 @dataclass(frozen=True)
@@ -50,14 +52,27 @@ class PlantFault(Shown):
         """Delta of the fault at times t [s], of the shape of t."""
         return self.magnitude * self.profile.value(t)
 
-    def model(self, nominal: UncertainModel) -> UncertainModel:
-        """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+    def model(self, nominal: Model) -> Model:
+        """The observer's model of this fault; it contains ``nominal`` and every intermediate size.
+
+        Delta is a parameter of a nonlinear model, free at each sample.
+        """
+        if isinstance(nominal, NonlinearModel):
+            dynamics, outputs = with_terms(nominal, self.direction)
+            return rewritten(nominal, dynamics=dynamics, outputs=outputs, parameters={self._name: self._bounds})
         return nominal.in_given_time(self._model)
 
     def _model(self, nominal: UncertainModel) -> UncertainModel:
-        bounds = (min(0.0, self.magnitude), max(0.0, self.magnitude))
-        named = replace(self.direction, bounds=bounds, name=self.direction.name or "plant fault")
+        named = replace(self.direction, bounds=self._bounds, name=self._name)
         return nominal.replace(uncertainties=[*nominal.uncertainties, named])
+
+    @property
+    def _bounds(self) -> tuple[float, float]:
+        return min(0.0, self.magnitude), max(0.0, self.magnitude)
+
+    @property
+    def _name(self) -> str:
+        return self.direction.name or "plant fault"
 
     def perturbation(
         self, nominal: UncertainModel, t: float, x: ArrayLike, u: ArrayLike, w: ArrayLike, schedule: Any = None

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 from polytopes.shown import Shown
 from svo.checks import Array, expect_one_of, is_finite_number
 from svo.faults.blocks import channels, mapped, only_columns, only_rows, product_of, with_noise
+from svo.faults.equations import Model, rewritten, scaled_readings
 from svo.faults.profiles import Profile, at_times, check_profile
 from svo.models import Schedulable, UncertainModel, Uncertainty
+from svo.models.nonlinear import NonlinearModel
 
 SensorKind = Literal["bias", "drift", "scaling", "hard"]
 
@@ -110,9 +112,26 @@ class SensorFault(Shown):
             readings[..., channel] = law.gain * readings[..., channel] + law.offset
         return readings
 
-    def model(self, nominal: UncertainModel) -> UncertainModel:
-        """The observer's model of this fault; it contains ``nominal`` and every intermediate size."""
+    def model(self, nominal: Model) -> Model:
+        """The observer's model of this fault; it contains ``nominal`` and every intermediate size.
+
+        Delta is a parameter of a nonlinear model, free at each sample.
+        """
+        if isinstance(nominal, NonlinearModel):
+            return self._equations(nominal)
         return nominal.in_given_time(self._model)
+
+    def _equations(self, nominal: NonlinearModel) -> NonlinearModel:
+        where = channels(self.where, nominal.n_outputs, "outputs in the model")
+        gain = max(1.0, abs(1.0 + self.magnitude)) if self.kind == "scaling" else 1.0
+        noise = nominal.noise.copy()
+        if self.kind in ("bias", "drift"):
+            noise[list(where)] += abs(self.magnitude)
+            return nominal.replace(n=noise)
+        noise[list(where)] *= gain
+        name = f"{self.kind} of {', '.join(nominal.names['outputs'][i] for i in where)}"
+        law = scaled_readings(where, self.magnitude if self.kind == "hard" else None)
+        return rewritten(nominal, outputs=law, parameters={name: self._bounds}, noise=noise)
 
     def _model(self, nominal: UncertainModel) -> UncertainModel:
         channels(self.where, nominal.n_outputs, "outputs in the model")

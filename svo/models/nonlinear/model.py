@@ -20,8 +20,8 @@ from svo.logs.log import Log
 from svo.models.nonlinear.carrier import carrier_of
 from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput, check_output, linear_output
-from svo.models.nonlinear.simulation import simulated
-from svo.models.nonlinear.tracing import Function, Retraced, Symbols, traced
+from svo.models.nonlinear.simulation import given_values, simulated
+from svo.models.nonlinear.tracing import Function, OfVectors, Symbols, retraced, traced
 from svo.models.nonlinear.transition import Transition, mapped, transition
 from svo.models.state_range import StateRange, start_range, state_range
 
@@ -116,7 +116,7 @@ class NonlinearModel(Value, Shown):
         twice = next((name for name in all_names if all_names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"the name {twice!r} stands for two things; expected states, inputs and so on to differ")
-        symbols, n = self._symbols, len(self.states)
+        symbols, n = self.symbols, len(self.states)
         low, high = (end[len(self.disturbances) :] for end in span)
         fixed = np.where(low == high, low, np.nan)
         for name in ("physical", "valid"):
@@ -141,13 +141,14 @@ class NonlinearModel(Value, Shown):
 
     def __getstate__(self) -> dict[str, Any]:
         """Functions travel as what they were traced to: a pickle need not know where they were written."""
-        f = Retraced.of("f", self.f, self._symbols, self.states)
-        return self.__dict__ | {"f": f, "h": Retraced.of("h", self.h, self._symbols, self.outputs)}
+        pair = zip(("f", "h"), self.equations, strict=True)
+        return self.__dict__ | {name: own for name, own in pair if not isinstance(getattr(self, name), Mapping)}
 
     # -- sizes -----------------------------------------------------------------------------------
 
     @property
-    def _symbols(self) -> Symbols:
+    def symbols(self) -> Symbols:
+        """Names of what f and h are of."""
         return Symbols(self.states, self.disturbances, tuple(self.parameters), self.inputs)
 
     def __repr__(self) -> str:
@@ -204,6 +205,12 @@ class NonlinearModel(Value, Shown):
         n, nw = self.n_states, len(self.flow.varying)
         is_disturbed = bool((self.reading.used[n : n + nw] & ~self.flow.varying).any())
         return carrier_of(self.flow, self.n_inputs, is_disturbed, self.noise, self.Ts, self.physical, self.largest)
+
+    @property
+    def equations(self) -> tuple[OfVectors, OfVectors]:
+        """f and h as functions of the vectors x, w, p and u that the model has, by these names: to make others of."""
+        symbols = self.symbols
+        return retraced("f", self.f, symbols, self.states), retraced("h", self.h, symbols, self.outputs)
 
     def replace(self, **changes: Any) -> NonlinearModel:
         """A copy with ``changes`` of arguments by name, checked again."""
@@ -295,7 +302,14 @@ class NonlinearModel(Value, Shown):
 
     @options_by_name
     def simulate(
-        self, x0: ArrayLike, u: ArrayLike, rng: np.random.Generator, *, corners: bool = False, substeps: int = 20
+        self,
+        x0: ArrayLike,
+        u: ArrayLike,
+        rng: np.random.Generator,
+        *,
+        corners: bool = False,
+        substeps: int = 20,
+        parameters: Mapping[str, ArrayLike] | None = None,
     ) -> Log:
         """A run with random w, p and noise inside their bounds, for tests and tutorials.
 
@@ -312,6 +326,8 @@ class NonlinearModel(Value, Shown):
             Draw every w, p and noise at an end of its interval instead of uniformly inside.
         substeps : int
             Steps of the integration within a sample, or within a quarter of it where something varies.
+        parameters : mapping from names to (K,) arrays, optional
+            Values at each sample of parameters that are not drawn; within their bounds.
 
         Raises
         ------
@@ -326,7 +342,10 @@ class NonlinearModel(Value, Shown):
         expect_kind("rng", rng, np.random.Generator, "a numpy Generator, such as np.random.default_rng(0)")
         expect(is_count(substeps, 1), "substeps", substeps, "a number of steps >= 1")
         T = self.Ts if self.continuous else None
-        return simulated(self.flow, self.reading, self.noise, self.Ts, x, inputs, rng, corners, T, int(substeps))
+        given = given_values(self.flow, list(self.parameters), parameters or {}, len(inputs))
+        return simulated(
+            self.flow, self.reading, self.noise, self.Ts, x, inputs, rng, corners, T, int(substeps), given
+        )
 
 
 def _names(what: str, given: Any) -> tuple[str, ...]:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from svo.checks import Array
+import numpy as np
+from numpy.typing import ArrayLike
+
+from svo.checks import Array, expect, finite_array
 from svo.functions.tape import Tape
 from svo.logs.log import Log
 from svo.models.draws import draw
@@ -24,17 +28,34 @@ def simulated(
     corners: bool,
     T: float | None,
     substeps: int,
+    given: Array,
 ) -> Log:
-    """See `NonlinearModel.simulate`; ``T`` is None for equations in discrete time."""
+    """See `NonlinearModel.simulate`; ``T`` is None in discrete time, ``given`` (K, nw) NaN where w is drawn."""
     states, outputs = [], []
-    for u in inputs:
-        w = draw(flow.w.lower, flow.w.upper, rng, corners)
+    flow = replace(flow, varying=flow.varying & np.isnan(given).all(axis=0))
+    for u, known in zip(inputs, given, strict=True):
+        w = np.where(np.isnan(known), draw(flow.w.lower, flow.w.upper, rng, corners), known)
         states.append(x)
         outputs.append(reading.values(np.concatenate([x, w, u])) + draw(-noise, noise, rng, corners))
         x = advanced(flow, x, w, u, rng, corners, T, substeps)
         _check(flow, x, len(states) - 1)
     time: Array = np.arange(len(inputs), dtype=float) * Ts
     return Log(time=time, u=inputs, y=np.array(outputs), x=np.array(states))
+
+
+def given_values(flow: Flow, names: Sequence[str], parameters: Mapping[str, ArrayLike], samples: int) -> Array:
+    """Values (K, nw) that parameters, the last of w, have at each sample; NaN of what is drawn."""
+    given = np.full((samples, len(flow.varying)), np.nan)
+    first = len(flow.varying) - len(names)
+    for name, values in parameters.items():
+        expect(name in names, "parameters", name, f"names of any of {', '.join(names) or 'none'}")
+        j, own = first + list(names).index(name), finite_array(f"parameters[{name!r}]", values, (samples,))
+        low, high = flow.w.lower[j], flow.w.upper[j]
+        if not ((own >= low) & (own <= high)).all():
+            ends = f"{own.min()} to {own.max()}"
+            raise ValueError(f"parameters[{name!r}] is from {ends}; expected within [{low}, {high}]")
+        given[:, j] = own
+    return given
 
 
 def advanced(

@@ -81,30 +81,37 @@ def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequ
     return Tape.of(recorder, rows_of(what, found, recorder, names), first)
 
 
-class Retraced:
-    """A function of the model as the tape that it was traced to, with every parameter a coordinate.
+class OfVectors:
+    """A function of x, w, p and u as one whose arguments are those of them that a model has."""
 
-    It is what a pickle holds of a function, which need not be one that a pickle can hold.
-    """
-
-    def __init__(self, tape: Tape, sizes: Sizes) -> None:
-        self.tape = tape
-        self.letters = [letter for letter, size in zip(ORDER, sizes, strict=True) if size]
+    def __init__(self, function: Callable[..., Any], symbols: Symbols) -> None:
+        self.function = function
+        self.letters = [letter for letter, names in zip(ORDER, symbols, strict=True) if names]
         self.__signature__ = Signature([Parameter(letter, Parameter.KEYWORD_ONLY) for letter in self.letters])
 
     def __call__(self, **vectors: Any) -> Any:
+        return self.function(**{letter: vectors.get(letter, np.zeros(0)) for letter in ORDER})
+
+
+class Retraced:
+    """A function of x, w, p and u as the tape that it was traced to, with every parameter a coordinate."""
+
+    def __init__(self, tape: Tape) -> None:
+        self.tape = tape
+
+    def __call__(self, **vectors: Any) -> Any:
         """Rows of expressions, or of numbers."""
-        z = np.concatenate([vectors[letter] for letter in self.letters])
+        z = np.concatenate([vectors[letter] for letter in ORDER])
         first = next((v for v in z if isinstance(v, Expression)), None)
         return self.tape.values(z) if first is None else self.tape.record(list(z), first.recorder)
 
-    @classmethod
-    def of(cls, what: str, function: Function, symbols: Symbols, names: Sequence[str] | None) -> Function:
-        """A function's; text stays as it is."""
-        if isinstance(function, Mapping | Retraced):
-            return function
-        free = np.full(len(symbols.p), np.nan)
-        return cls(traced(what, function, symbols, free, names), Sizes(*map(len, symbols)))
+
+def retraced(what: str, function: Any, symbols: Symbols, names: Sequence[str] | None) -> OfVectors:
+    """A function of a model as what it was traced to: a pickle can hold it, and other functions be made of it."""
+    if isinstance(function, OfVectors) and isinstance(function.function, Retraced):
+        return function
+    free = np.full(len(symbols.p), np.nan)
+    return OfVectors(Retraced(traced(what, function, symbols, free, names)), symbols)
 
 
 def _written(

@@ -14,7 +14,7 @@ from svo.models.nonlinear import NonlinearModel
 from svo.plant.description.model import ARRAYS, arrays_of, remainder_of
 from svo.plant.description.table import Table
 
-_KNOWN = {
+KEYS = {
     "sensor": ("output", "kind", "magnitude"),
     "actuator": ("input", "kind", "magnitude", "travel", "frequency_hz"),
     "plant": (*ARRAYS, "magnitude", "remainder"),
@@ -44,18 +44,18 @@ def check_name(every: Table, name: str) -> Table:
 
 
 def _fault_model(table: Table, nominal: UncertainModel, names: Mapping[str, Sequence[str]]) -> FaultModel:
-    kind = table.text("type", choices=tuple(_KNOWN))
-    table.check_keys(("type", *_KNOWN[kind]))
+    kind = table.text("type", choices=tuple(KEYS))
+    table.check_keys(("type", *KEYS[kind]))
     remainder = _own_remainder(table, nominal)
     if kind == "model":
         arrays = arrays_of(table)
         if not arrays:
-            raise table.error(None, f"is the nominal model; expected at least one of {', '.join(_KNOWN['model'])}")
+            raise table.error(None, f"is the nominal model; expected at least one of {', '.join(KEYS['model'])}")
         with table.errors():
             model = _in_time_of(nominal, lambda plant: plant.replace(**arrays), remainder)
             return FaultModel(model, table.truth("contains_nominal", False))
     with table.errors():
-        return FaultModel(_in_time_of(nominal, _fault(table, kind, names).model, remainder), contains_nominal=True)
+        return FaultModel(_in_time_of(nominal, fault_of(table, kind, names).model, remainder), contains_nominal=True)
 
 
 def _own_remainder(table: Table, nominal: UncertainModel) -> Any:
@@ -75,7 +75,11 @@ def _in_time_of(
     return change(nominal) if nominal.origin is None else nominal.origin.changed(change, remainder)
 
 
-def _fault(table: Table, kind: str, names: Mapping[str, Sequence[str]]) -> ActuatorFault | PlantFault | SensorFault:
+def fault_of(table: Table, kind: str, names: Mapping[str, Sequence[str]]) -> ActuatorFault | PlantFault | SensorFault:
+    """The fault of a table of type "sensor", "actuator" or "plant".
+
+    ``names`` are those of "inputs" and "outputs".
+    """
     # An observer's model holds at all times, so the profile says nothing here.
     magnitude = table.number("magnitude") if "magnitude" in table else None
     options: dict[str, Any] = {"magnitude": magnitude, "profile": Step()}

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from svo.models.nonlinear import NonlinearModel
-from svo.plant.description.faults import FaultModel, channels_of, check_name
-from svo.plant.description.model import range_of
+from svo.plant.description.faults import KEYS, FaultModel, check_name, fault_of
+from svo.plant.description.model import ARRAYS, range_of
 from svo.plant.description.table import Table
 
 _MODEL = (
     "dynamics", "outputs", "disturbances", "n", "physical", "valid", "largest", "varying", "continuous",
 )  # fmt: skip
+_FAULTS = {"sensor": KEYS["sensor"], "actuator": KEYS["actuator"], "plant": (*ARRAYS, "magnitude")}
+_ROWS = {"dynamics": "f", "outputs": "h"}
 _RANGES = ("physical", "valid", "largest")
 
 
@@ -47,33 +47,39 @@ def nonlinear_model_of(top: Table, names: Mapping[str, Sequence[str]]) -> Nonlin
 
 
 def nonlinear_faults_of(top: Table, nominal: NonlinearModel) -> dict[str, FaultModel]:
-    """Faults of type "parameter", other bounds of some parameters, and "sensor", an error that adds to readings."""
+    """The models of all faults, by name: of type "sensor", "actuator" and "plant", and "parameter" (`_parameters`)."""
     every = top.table("faults")
-    return {name: _fault(check_name(every, name), nominal) for name in every.content}
+    names = {"inputs": nominal.inputs, "outputs": nominal.outputs or ()}
+    return {name: _fault(check_name(every, name), nominal, names) for name in every.content}
 
 
-def _fault(table: Table, nominal: NonlinearModel) -> FaultModel:
-    is_sensor = table.text("type", choices=("parameter", "sensor")) == "sensor"
-    return _sensor_fault(table, nominal) if is_sensor else _parameter_fault(table, nominal)
-
-
-def _sensor_fault(table: Table, nominal: NonlinearModel) -> FaultModel:
-    """Any additive error up to a size, at each sample another one: as wide as more noise."""
-    table.check_keys(("type", "output", "kind", "magnitude"))
-    table.text("kind", choices=("bias", "drift"))
-    noise = nominal.noise.copy()
-    noise[np.atleast_1d(channels_of(table, "output", nominal.outputs or ()))] += abs(table.number("magnitude"))
+def _fault(table: Table, nominal: NonlinearModel, names: Mapping[str, Sequence[str]]) -> FaultModel:
+    kind = table.text("type", choices=("parameter", *_FAULTS))
+    if kind == "parameter":
+        return _parameters(table, nominal)
+    table.check_keys(("type", *_FAULTS[kind]))
     with table.errors():
-        return FaultModel(nominal.replace(n=noise), contains_nominal=True)
+        return FaultModel(fault_of(table, kind, names).model(nominal), contains_nominal=True)
 
 
-def _parameter_fault(table: Table, nominal: NonlinearModel) -> FaultModel:
-    table.check_keys(("type", "parameters"))
-    changed = _numbers(table.table("parameters", tuple(nominal.parameters)))
-    if not changed:
+def _parameters(table: Table, nominal: NonlinearModel) -> FaultModel:
+    """Other bounds of some parameters; with equations of its own that may have further ones.
+
+    Whether a model with other equations contains the healthy plant has to be said.
+    """
+    table.check_keys(("type", "parameters", *_ROWS, "contains_nominal"))
+    rows = {name: _texts(table, key) for key, name in _ROWS.items() if key in table}
+    changed = _numbers(table.table("parameters", None if rows else tuple(nominal.parameters)))
+    if not changed and not rows:
         raise table.error("parameters", f"is missing; expected bounds of any of {', '.join(nominal.parameters)}")
+    if "contains_nominal" in table and not rows:
+        raise table.error("contains_nominal", "has no meaning where only bounds change, which are compared; drop it")
+    own: dict[str, Any] = {"f": nominal.f, "h": nominal.h}
+    equations: dict[str, Any] = {name: {**own[name], **changes} for name, changes in rows.items()}
     with table.errors():
-        model = nominal.replace(parameters={**nominal.parameters, **changed})
+        model = nominal.replace(parameters={**nominal.parameters, **changed}, **equations)
+    if rows:
+        return FaultModel(model, table.truth("contains_nominal", False))
     (low, high), (least, most) = model.flow.w, nominal.flow.w
     return FaultModel(model, contains_nominal=bool((low <= least).all() and (high >= most).all()))
 

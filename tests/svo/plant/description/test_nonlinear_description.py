@@ -86,13 +86,41 @@ def test_a_sensor_fault_is_any_error_of_its_size(tmp_path: Path) -> None:
     plant = described(tmp_path, "[faults.leak]", fault)
     assert plant.faults["gauge"].contains_nominal
     assert plant.faults["gauge"].model.noise.tolist() == [0.1, 0.6]
+    frozen = described(tmp_path, "[faults.leak]", fault.replace("bias", "hard")).faults["gauge"]
+    assert frozen.model.parameters["hard of level_2"] == (0.0, 1.0)
     for old, new, why in (
         ('"level_2"\nkind', '"level_3"\nkind', "expected one or more of the columns level_1, level_2"),
-        ('"bias"', '"hard"', "expected one of bias, drift"),
+        ('"bias"', '"frozen"', "expected one of bias, drift, scaling, hard"),
         ("magnitude = -0.5\n", "", "key 'magnitude': is missing"),
     ):
         with pytest.raises(ValueError, match=why):
             described(tmp_path, "[faults.leak]", fault.replace(old, new))
+
+
+def test_faults_of_actuators_of_the_plant_and_of_equations(tmp_path: Path) -> None:
+    tables = {
+        "pump": 'type = "actuator"\ninput = "pump"\nkind = "loss"\nmagnitude = 0.5',
+        "rain": 'type = "plant"\na = [0.01, 0.0]\nmagnitude = 1.0',
+        "siphon": 'type = "parameter"\nparameters = { siphon = [0.0, 0.1] }\ncontains_nominal = true\n'
+        'dynamics = { h2 = "(pipe * sroot(g2 * (h1 - h2)) - (outlet + siphon) * sqrt(g2 * h2)) / area + d2" }',
+    }
+    text = "".join(f"[faults.{name}]\n{table}\n\n" for name, table in tables.items())
+    plant = described(tmp_path, "[faults.leak]", text + "[faults.leak]")
+    assert all(fault.contains_nominal for fault in plant.faults.values())
+    extra = {name: list(fault.model.parameters)[5:] for name, fault in plant.faults.items()}
+    assert extra["pump"] == ["share of loss of pump"]
+    assert extra["rain"] == ["plant fault"]
+    assert extra["siphon"] == ["siphon"]
+    assert len(plant.bank("stated").observers) == 6
+    for old, new, why in (
+        ('magnitude = 0.5', 'magnitude = 1.5', r"\[faults.pump\]: magnitude is 1.5; expected the lost fraction"),
+        ('a = [0.01, 0.0]', 'a = [0.01]', r"\[faults.rain\]: a of the direction has shape \(1,\); expected \(2,\)"),
+        ('(outlet + siphon)', '(outlet + sifon)', r"\[faults.siphon\]: f, row h2: unknown symbol 'sifon'.*'siphon'"),
+        ('{ h2 = "(pipe', '{ h3 = "(pipe', r"\[faults.siphon\]: f has a row for 'h3'"),
+        ('contains_nominal = true', 'contains_nominal = false', "its observer needs a set to start from"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            described(tmp_path, "[faults.leak]", text.replace(old, new) + "[faults.leak]")
 
 
 def test_an_alarm_of_other_equations_is_not_the_plants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,7 +150,7 @@ def test_an_alarm_of_other_equations_is_not_the_plants(tmp_path: Path, monkeypat
         ("d2 = 0.002 }", "d2 = -0.002 }", "d2 is between 0.002 and -0.002"),
         ('{ hole = [0.0, 0.2] }', "{ hol = [0.0, 0.2] }", "faults.leak.parameters.*did you mean 'hole'"),
         ('{ hole = [0.0, 0.2] }', "{}", r"\[faults.leak\], key 'parameters': is missing"),
-        ('type = "parameter"\nparameters = { h', 'type = "plant"\nparameters = { h', "one of parameter, sensor"),
+        ('type = "parameter"\nparameters = { h', 'type = "model"\nparameters = { h', "one of parameter, sensor"),
         ("lower = [28.0, 10.0]", "lower = [28.0]", r"\[initial\]"),
         ('h1 = "(pump', 'h3 = "(pump', r"unknown symbol 'h1'"),
     ],
