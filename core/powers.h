@@ -39,6 +39,9 @@ static inline double next_up(double value)
     return value;
 }
 
+/* The next float below a finite one. */
+static inline double next_down(double value) { return -next_up(-value); }
+
 static inline double power_of_two(integer power) { return times_power(1.0, power); }
 
 #endif

@@ -6,9 +6,9 @@
 #define POLYTOPES_SUMS_H
 
 #include "core.h"
+#include "pairs.h"
 #include "powers.h"
 
-static const double SPLIT = 134217729.0; /* 2^27 + 1, halves a float (Dekker 1971) */
 static const double UNDERFLOW_BELOW = 1e-290; /* products below may lose what rounding left */
 static const double TINY = 1e-300;
 
@@ -16,25 +16,6 @@ typedef struct {
     double total, lost; /* what is summed so far is total + lost, */
     double error;       /* up to this */
 } Sum;
-
-typedef struct {
-    double value, rest;
-} Pair;
-
-/* The sum as a float, and what was rounded off (Knuth). */
-static inline Pair two_sum(double u, double v)
-{
-    const double total = u + v, part = total - u;
-    return (Pair){total, (u - (total - part)) + (v - part)};
-}
-
-/* The product as a float, and what was rounded off (Dekker). */
-static inline Pair two_product(double u, double v)
-{
-    const double product = u * v, big_u = SPLIT * u, big_v = SPLIT * v;
-    const double u1 = big_u - (big_u - u), v1 = big_v - (big_v - v), u2 = u - u1, v2 = v - v1;
-    return (Pair){product, u2 * v2 - (((product - u1 * v1) - u2 * v1) - u1 * v2)};
-}
 
 /* Adds u v (Ogita, Rump and Oishi 2005). */
 static inline void add_product(Sum *sum, double u, double v)

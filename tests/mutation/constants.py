@@ -75,6 +75,16 @@ CONSTANTS = (
     Constant("core/window/window.h", "UNIT", "outward", f"{WINDOW}/test_chain.py"),
     Constant("core/interval/predictor.c", "SLACK", "outward", "tests/svo/interval"),
     Constant("core/polytopes/sums.h", "TINY", "outward", f"{SETS}/test_simplex_kernel.py"),
+    *(
+        Constant(f"core/tape/{file}.c", f"{name}_ERROR", "outward", "tests/core/test_elementary.py")
+        for file, name in (
+            ("exponential", "EXP"),
+            ("exponential", "TANH"),
+            ("logarithm", "LOG"),
+            ("waves", "WAVE"),
+            ("angle", "ANGLE"),
+        )
+    ),
     Constant("core/polytopes/facets.c", "TOLERANCE", "tolerance", f"{SETS}/test_row_redundancy.py"),
     *(
         Constant(f"core/{file}", name, "heuristic")
