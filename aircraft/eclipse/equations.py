@@ -17,15 +17,15 @@ from numpy.typing import ArrayLike
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.models import NAMES, SPEED_MOMENT_INCREASE
 from aircraft.eclipse.noise import NoiseSet
+from aircraft.eclipse.scenarios import Fault
 from aircraft.eclipse.simulator import Surrogate
-from svo.faults import ActuatorFault, PlantFault, SensorFault
+from svo.faults import ActuatorFault, SensorFault
 from svo.functions import atan2, cos, sin, sqrt
 from svo.models.nonlinear import NonlinearModel
 
 # [u, w, theta, q]: beyond it nothing is said of a flight. It holds what follows within a sample of any `initial` state.
 VALID = ((5.0, -40.0, -1.5, -6.0), (90.0, 50.0, 1.5, 6.0))
 
-Fault = SensorFault | ActuatorFault | PlantFault
 Rows = list[Any]
 
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from aircraft.eclipse.autopilot import DESIGN_AIRSPEED, INPUT_LOWER, INPUT_UPPER
+from aircraft.eclipse.equations import Equations, nonlinear_models
 from aircraft.eclipse.models import MismatchBounds, ScheduledModel, read_bounds
 from aircraft.eclipse.noise import NOISE_SETS
-from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS, Scenarios
+from aircraft.eclipse.scenarios import FAULT_TIME, FAULTS, LARGEST, PROFILES, TS, Fault, Scenarios
 from aircraft.eclipse.schedule import AirspeedFilter
 from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
@@ -23,8 +24,9 @@ from svo.faults import SensorFault
 from svo.isolation import ArchitectureI, ArchitectureII, Bank
 from svo.logs.log import Log
 from svo.models import ScheduleTable, UncertainModel
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.observer import WindowObserver
-from svo.plant import Column, Columns, Distribution, Reference, StatedFault
+from svo.plant import Column, Columns, Distribution, Reference, Scheduler, StatedFault, no_schedule
 
 if TYPE_CHECKING:
     from svo.detectors.detector import Detector
@@ -80,8 +82,9 @@ def _description(fault: str, size: float) -> str:
 class Eclipse(Shown):
     """The Eclipse UAV in closed loop about 37 m/s, with the faults of Rosa and Silvestre (2013), section 6.
 
-    The observers' bounds are measured on these flights (`aircraft.eclipse.mismatch`): they promise nothing
-    for a flight unlike them.
+    The observers' models are linear and scheduled by airspeed, as in the paper ("lpv"), or have the simulator's own
+    equations ("nonlinear"). What the linear ones leave out is measured on these flights (`aircraft.eclipse.mismatch`),
+    so that they promise nothing for a flight unlike them; what linearising the equations leaves out is proven.
 
     Parameters
     ----------
@@ -91,15 +94,19 @@ class Eclipse(Shown):
     architecture : {"I", "II"}
         Of the bank. Under Architecture II the fault observers start, at the detection, from the set of all
         states of a flight between 25 and 55 m/s.
+    model_kind : {"lpv", "nonlinear"}
+        Of the observers' models.
     bounds : mapping of noise set to mapping of observer to MismatchBounds
-        What the observers' models leave out; by default as measured on the flights of ``scenarios``.
+        What the linear models leave out; by default as measured on the flights of ``scenarios``.
     """
 
     scenarios: Scenarios = field(default_factory=Scenarios)
     horizon: int = 10
     architecture: Literal["I", "II"] = "I"
+    model_kind: Literal["lpv", "nonlinear"] = "lpv"
     bounds: Mapping[str, Mapping[str, MismatchBounds]] = field(default_factory=read_bounds, repr=False)
     architectures: tuple[str, ...] = ("I", "II")
+    model_kinds: tuple[str, ...] = ("lpv", "nonlinear")
     name: str = "eclipse"
     title: str = "Eclipse UAV, longitudinal axis: alpha sensor, elevator and M_u faults"
     Ts: float = TS
@@ -117,6 +124,7 @@ class Eclipse(Shown):
 
     def __post_init__(self) -> None:
         expect(self.architecture in ("I", "II"), "architecture", self.architecture, "'I' or 'II'")
+        expect(self.model_kind in ("lpv", "nonlinear"), "model_kind", self.model_kind, "'lpv' or 'nonlinear'")
 
     def duration(self, fault: str, profile: str) -> float:
         """Length of a run [s]; ``fault`` may be "none"."""
@@ -125,31 +133,54 @@ class Eclipse(Shown):
     def simulate(self, fault: str, profile: str, noise: str, seed: int | np.random.SeedSequence) -> Log:
         """One run with its true states [u, w, theta, q]; ``fault`` may be "none". The inputs are commands."""
         run = self.scenarios.run(fault, profile, noise, seed)
-        return Log(time=run.time, u=run.flight.u, y=run.flight.y, x=run.flight.x[:, :4], schedule=run.schedule)
+        schedule = run.schedule if self.model_kind == "lpv" else None
+        return Log(time=run.time, u=run.flight.u, y=run.flight.y, x=run.flight.x[:, :4], schedule=schedule)
 
-    def models(self, noise: str) -> dict[str, UncertainModel]:
+    def models(self, noise: str) -> Mapping[str, UncertainModel] | Mapping[str, NonlinearModel]:
         """The observers' models: "nominal", then one for each fault, which contains the healthy aircraft."""
+        return self.lpv_models(noise) if self.model_kind == "lpv" else self.nonlinear_models(noise)
+
+    def lpv_models(self, noise: str) -> dict[str, UncertainModel]:
+        """Linear ones, scheduled by airspeed."""
         expect_one_of("noise", noise, NOISE_SETS)
-        if noise not in self._models:
+        if noise not in self._lpv_models:
             bounds, scheduled = self.bounds[noise], self.scenarios.model
             models = {"nominal": scheduled.model(noise, bounds["nominal"])}
-            for name in self.faults:
-                fault = self.scenarios.fault(name, LARGEST)
-                models[name] = fault.model(scheduled.model(noise, bounds[name]))
-            self._models[noise] = models
-        return dict(self._models[noise])
+            models |= {name: f.model(scheduled.model(noise, bounds[name])) for name, f in self._largest.items()}
+            self._lpv_models[noise] = models
+        return dict(self._lpv_models[noise])
+
+    def nonlinear_models(self, noise: str) -> dict[str, NonlinearModel]:
+        """Those with the simulator's equations."""
+        expect_one_of("noise", noise, NOISE_SETS)
+        if noise not in self._nonlinear_models:
+            model = self.scenarios.model
+            equations = Equations(model.surrogate, model.derivatives, model.moment_reference)
+            initial = (INITIAL_LOWER, INITIAL_UPPER)
+            models = nonlinear_models(equations, NOISE_SETS[noise], self._largest, model.Ts, initial)
+            self._nonlinear_models[noise] = models
+        return dict(self._nonlinear_models[noise])
+
+    @property
+    def _largest(self) -> dict[str, Fault]:
+        """Each fault at its full size, which its observer must contain."""
+        return {name: self.scenarios.fault(name, LARGEST) for name in self.faults}
 
     @cached_property
-    def _models(self) -> dict[str, dict[str, UncertainModel]]:
+    def _lpv_models(self) -> dict[str, dict[str, UncertainModel]]:
         """Those of noise sets that were asked for: every bank of a study has the same."""
+        return {}
+
+    @cached_property
+    def _nonlinear_models(self) -> dict[str, dict[str, NonlinearModel]]:
         return {}
 
     def stated_faults(self, noise: str, size: float = 1.0) -> dict[str, StatedFault]:
         """The aircraft with each fault at the size of its step: alpha + 3 deg, half the elevator, 1.3 M_u.
 
-        ``size`` is a fraction of it, in (0, 1].
+        As a linear model, whatever the bank's are; ``size`` is a fraction of it, in (0, 1].
         """
-        models, sized, stated = self.models(noise), replace(self.scenarios, size=size), {}
+        models, sized, stated = self.lpv_models(noise), replace(self.scenarios, size=size), {}
         for name in self.faults:
             fault = sized.fault(name, "step")
             if isinstance(fault, SensorFault):
@@ -177,6 +208,10 @@ class Eclipse(Shown):
         """The same plant with the other bank."""
         return replace(self, architecture=architecture)
 
+    def with_models(self, kind: Literal["lpv", "nonlinear"]) -> Eclipse:
+        """The same plant with a bank of the other ``kind`` of models."""
+        return replace(self, model_kind=kind)
+
     def with_noise(self, distribution: Distribution) -> Eclipse:
         """This aircraft with bounded or Gaussian noise and gusts of the same rms; models and bounds are unchanged."""
         return replace(self, scenarios=replace(self.scenarios, distribution=distribution))
@@ -186,11 +221,11 @@ class Eclipse(Shown):
         from aircraft.eclipse.detectors import detectors
 
         stated = {name: fault.model for name, fault in self.stated_faults(noise).items()}
-        return detectors(self.models(noise), stated, HPolytope.box(INITIAL_LOWER, INITIAL_UPPER))
+        return detectors(self.lpv_models(noise), stated, HPolytope.box(INITIAL_LOWER, INITIAL_UPPER))
 
-    def scheduler(self) -> AirspeedFilter:
-        """A fresh causal filter of the measured airspeed (first order, 0.5 s)."""
-        return AirspeedFilter(self.Ts, DESIGN_AIRSPEED)
+    def scheduler(self) -> Scheduler:
+        """A fresh causal filter of the measured airspeed (first order, 0.5 s); nonlinear models have no schedule."""
+        return AirspeedFilter(self.Ts, DESIGN_AIRSPEED) if self.model_kind == "lpv" else no_schedule
 
 
 def _shifted(offset: ScheduleTable, shift: Array) -> ScheduleTable:

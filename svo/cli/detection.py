@@ -12,7 +12,7 @@ import typer
 import svo as face
 from svo.cli.destinations import writable_file, writable_folder
 from svo.cli.frame import app, chosen_noise, note, one_line_errors
-from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, NoiseName, Overwrite, positive
+from svo.cli.options import Architecture, AsJson, DescribedName, LogFile, Models, NoiseName, Overwrite, positive
 from svo.cli.output import print_json, say
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def detect(
     ] = None,
     noise: NoiseName = None,
     architecture: Architecture = None,
+    models: Models = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a plant's isolation bank over a log, sample by sample, and say what it finds.
@@ -71,7 +72,7 @@ def detect(
     if out is not None:
         check_no_results(out, overwrite)
     wanted = _wanted_report(report, out, states, formats)
-    the_plant = face.find_plant(plant, architecture=architecture)
+    the_plant = face.find_plant(plant, architecture=architecture, models=models)
     if out is not None and not overwrite:
         check_kept_description(the_plant, out)
     noise = chosen_noise(the_plant, noise)
@@ -90,7 +91,8 @@ def detect(
     if out is not None:
         found.save(out, overwrite=overwrite)
         if wanted is not None and shown is not None:
-            words = [w for name, w in (("--noise", noise), ("--architecture", architecture)) if w for w in (name, w)]
+            chosen = {"--noise": noise, "--architecture": architecture, "--models": models}
+            words = [word for option, value in chosen.items() if value for word in (option, value)]
             with busy("Bounds and pictures"):
                 wanted.write(out, shown, log, ["svo", "detect", plant, str(log), *words])
     if as_json:
@@ -135,6 +137,7 @@ def watch(
     ] = None,
     overwrite: Overwrite = False,
     noise: NoiseName = None,
+    models: Models = None,
     until_end: Annotated[
         bool, typer.Option("--until-end", help="End where the file ends, instead of waiting for more.")
     ] = False,
@@ -174,7 +177,7 @@ def watch(
         from svo.detection.watch.watch import watch as run_watch
         from svo.plant.description import check_kept_description, keep_description
 
-        the_plant = face.find_plant(plant)
+        the_plant = face.find_plant(plant, models=models)
         noise = chosen_noise(the_plant, noise)
         lines = lines_of(log, until_end)
         session = Session(the_plant, noise, lines.name)

@@ -75,6 +75,10 @@ Architecture = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="Architecture of the bank, such as I or II. [default: the plant's own]"),
 ]
+Models = Annotated[
+    str | None,
+    typer.Option(metavar="KIND", help="Kind of the observers' models, such as lpv. [default: the plant's own]"),
+]
 FlightSeed = Annotated[int, typer.Option(min=0, help="Seed of the fault-free flight that gives the inputs.")]
 FaultSize = Annotated[
     float,

@@ -94,6 +94,12 @@ def study(
             metavar="NAME", help="Architecture of the bank; several see the same runs. [default: the plant's own]"
         ),
     ] = None,
+    models: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND", help="Kind of the observers' models; several see the same runs. [default: the plant's own]"
+        ),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the same study in DIR after an interruption.")
     ] = False,
@@ -127,8 +133,9 @@ def study(
 
     the_plant = plant_to_simulate(plant)
     configuration = StudyConfiguration.for_plant(
-        the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or ()
-    )
+        the_plant, runs=runs, seed=seed, noise=noise or (), faults=fault or (), architectures=architecture or (),
+        models=models or (),
+    )  # fmt: skip
     if overwrite:
         added = added_study(the_plant, configuration)
         StudyFolder(out).clear(resume, () if added is None else (added.name,))

@@ -10,7 +10,7 @@ from svo.logs.log import Log
 from svo.models import model_digest
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Certificate, Observer
-from svo.plant import MonitoredPlant, architecture_of
+from svo.plant import BankChoice, MonitoredPlant, bank_choice
 
 
 def alarms_of(
@@ -38,9 +38,24 @@ def alarms_at(
     for k, name in died:
         proof = outcome.certificates[name]
         assert proof is not None  # banks take no falsification without one
-        model = None if observers is None else digest_of_alarm(observers[name], proof)
-        alarms.append(Alarm(name, k, float(times[k]), proof, source, model))
+        alarms.append(alarm_of(name, k, float(times[k]), proof, source, None if observers is None else observers[name]))
     return tuple(alarms)
+
+
+def alarm_of(
+    name: str,
+    sample: int,
+    time: float,
+    proof: Certificate,
+    source: Mapping[str, str | int | float],
+    observer: Observer | None,
+) -> Alarm:
+    """The alarm of a falsification; with its ``observer`` it carries the digest of its model."""
+    if observer is None:
+        return Alarm(name, sample, time, proof, source)
+    if isinstance(observer.model, NonlinearModel):
+        source = {**source, "model": NONLINEAR}
+    return Alarm(name, sample, time, proof, source, digest_of_alarm(observer, proof))
 
 
 def digest_of_alarm(observer: Observer, certificate: Certificate) -> str:
@@ -49,7 +64,11 @@ def digest_of_alarm(observer: Observer, certificate: Certificate) -> str:
 
 
 def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:
-    """Which bank an alarm comes from, as stored with it: plant, architecture if there is a choice, kind of model."""
-    architecture = architecture_of(plant)
-    found = {"plant": plant.name} | ({} if architecture is None else {"architecture": architecture})
-    return found | ({"model": NONLINEAR} if isinstance(getattr(plant, "model", None), NonlinearModel) else {})
+    """Which bank an alarm comes from, as stored with it: the plant, and which of its banks if there is a choice."""
+    chosen = {name: value for name, value in bank_choice(plant)._asdict().items() if value is not None}
+    return {"plant": plant.name, **chosen}
+
+
+def bank_of_source(source: Mapping[str, str | int | float]) -> BankChoice:
+    """Which bank of its plant the source of an alarm names."""
+    return BankChoice(*(None if (value := source.get(name)) is None else str(value) for name in BankChoice._fields))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-from svo.detection.bank_alarms import digest_of_alarm
+from svo.detection.bank_alarms import bank_of_source, digest_of_alarm
 from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
 from svo.logs.drive import drive
 from svo.logs.log import Log
@@ -17,7 +17,7 @@ from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
 from svo.observers.window.chain import promises_of, prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
-from svo.plant import MonitoredPlant, in_architecture
+from svo.plant import BankChoice, MonitoredPlant, with_bank
 from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
 
@@ -30,22 +30,27 @@ class PlantModels:
     plant : MonitoredPlant
     log : Log
         Only time, u and y are used; the plant's own scheduler makes the schedule of them.
-
-    Attributes
-    ----------
-    log : Log
-        With that schedule.
     """
 
     def __init__(self, plant: MonitoredPlant, log: Log) -> None:
-        self._plant = plant
-        self.log = scheduled(plant.scheduler(), log)
+        self._plant, self._log = plant, log
+        self._chosen: dict[BankChoice, tuple[MonitoredPlant, Log]] = {}
 
     def bank(self, alarm: Alarm) -> Bank:
-        """A fresh bank of the architecture and noise set that an alarm names."""
-        architecture = alarm.source.get("architecture")
-        chosen = in_architecture(self._plant, None if architecture is None else str(architecture))
-        return on_log(chosen, self.log).bank(str(alarm.source.get("noise")))
+        """A fresh bank of the choice and noise set that an alarm names."""
+        plant, log = self._of(alarm)
+        return on_log(plant, log).bank(str(alarm.source.get("noise")))
+
+    def log(self, alarm: Alarm) -> Log:
+        """The log with the schedule of the bank that an alarm names."""
+        return self._of(alarm)[1]
+
+    def _of(self, alarm: Alarm) -> tuple[MonitoredPlant, Log]:
+        choice = bank_of_source(alarm.source)
+        if choice not in self._chosen:
+            plant = with_bank(self._plant, choice)
+            self._chosen[choice] = plant, scheduled(plant.scheduler(), self._log)
+        return self._chosen[choice]
 
     def difference(self, alarm: Alarm) -> str | None:
         """How an alarm's matrices, bounds and digest are not those of the plant's observer that it names, or None."""
@@ -64,17 +69,19 @@ class PlantModels:
         """How an alarm's matrices differ; where they do not, only sizes, sampling time and options can."""
         claimed = alarm.certificate.model_data()
         first = alarm.sample + 1 - len(claimed)
-        right = [self._sample(observer, k, alarm.sample) for k in range(first, first + len(claimed))]
+        log = self.log(alarm)
+        right = [_sample(observer, log, k, alarm.sample) for k in range(first, first + len(claimed))]
         for k, (mine, its) in enumerate(zip(claimed, right, strict=True), start=first):
             what = mine.difference(its)
             if what is not None:
                 return f"the {what} of sample {k} differs from that of the plant's model {alarm.observer!r}"
         return None
 
-    def _sample(self, observer: Observer, k: int, last: int) -> ModelSample:
-        """Matrices and bounds at sample k, with the transition to the next one, where a proof goes on to it."""
-        dt = self.log.interval_at(k + 1, observer.Ts) if k < last else None
-        return ModelSample.of(observer.model, self.log.schedule_at(k), interval_of(observer.model, dt))
+
+def _sample(observer: Observer, log: Log, k: int, last: int) -> ModelSample:
+    """Matrices and bounds at sample k, with the transition to the next one, where a proof goes on to it."""
+    dt = log.interval_at(k + 1, observer.Ts) if k < last else None
+    return ModelSample.of(observer.model, log.schedule_at(k), interval_of(observer.model, dt))
 
 
 def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:
@@ -105,7 +112,7 @@ def with_chains(checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: P
 
 def _with_chain(check: AlarmCheck, alarm: Alarm, models: PlantModels) -> AlarmCheck:
     begun = perf_counter()
-    ok, reason = _prove(models.bank(alarm), alarm, models.log)
+    ok, reason = _prove(models.bank(alarm), alarm, models.log(alarm))
     return replace(check, ok=ok, reason=reason, seconds=check.seconds + perf_counter() - begun)
 
 

@@ -159,7 +159,8 @@ def _completed(
 def _of_one_run(path: Path) -> list[Alarm]:
     """The alarms of a file, which a log can be given for."""
     alarms = read_alarms(path)
-    if any(alarm.source != alarms[0].source for alarm in alarms):
+    runs = [{key: value for key, value in alarm.source.items() if key != "model"} for alarm in alarms]
+    if any(run != runs[0] for run in runs):
         raise ValueError(
             f"{path} has alarms of several runs, and a log is that of one; give the alarms of that run alone"
         )

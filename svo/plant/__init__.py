@@ -7,22 +7,28 @@ from importlib import import_module
 from typing import Any
 
 from svo.logs.names import Column, Columns
+from svo.plant.choice import (
+    BankChoice,
+    OffersArchitectures,
+    OffersModels,
+    architecture_of,
+    bank_choice,
+    in_architecture,
+    with_bank,
+)
 from svo.plant.protocol import (
     HEALTHY,
     AddedStudy,
     Distribution,
     Exhibit,
     MonitoredPlant,
-    OffersArchitectures,
     Plant,
     Reference,
     StatedFault,
     TimesFaults,
-    architecture_of,
     chosen_noise,
     fault_start,
     first_faulty_sample,
-    in_architecture,
 )
 from svo.plant.registry import load_plant, registered_plants
 from svo.plant.scheduling import (
@@ -39,6 +45,7 @@ __all__ = [
     "HEALTHY",
     "AddedStudy",
     "AddsExhibits",
+    "BankChoice",
     "Column",
     "Columns",
     "ComparesDetectors",
@@ -49,6 +56,7 @@ __all__ = [
     "LimitsInputs",
     "MonitoredPlant",
     "OffersArchitectures",
+    "OffersModels",
     "Plant",
     "Reference",
     "SavesSchedule",
@@ -57,6 +65,7 @@ __all__ = [
     "StatesFaults",
     "TimesFaults",
     "architecture_of",
+    "bank_choice",
     "chosen_noise",
     "fault_start",
     "first_faulty_sample",
@@ -67,6 +76,7 @@ __all__ = [
     "resume_schedule",
     "saved_schedule",
     "schedule_of",
+    "with_bank",
 ]
 
 # Capabilities that a plant may have are declared beside what asks for them; their names are still found here.

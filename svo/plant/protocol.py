@@ -156,51 +156,6 @@ class StatedFault(Shown):
     model: UncertainModel
 
 
-@runtime_checkable
-class OffersArchitectures(Protocol):
-    """What a `Plant` offers besides if its bank can be built in more than one way.
-
-    Attributes
-    ----------
-    architecture : str
-        Of the plant's own `bank`.
-    architectures : tuple of str
-        All that there are.
-    """
-
-    architecture: str
-    architectures: tuple[str, ...]
-
-    def with_architecture(self, architecture: str) -> Plant:
-        """The same plant with the bank of another architecture."""
-        ...
-
-
-def architecture_of(plant: MonitoredPlant) -> str | None:
-    """The architecture of a plant's bank; None if the plant has one kind of bank only."""
-    return plant.architecture if isinstance(plant, OffersArchitectures) else None
-
-
-def in_architecture(plant: Any, architecture: str | None) -> Any:
-    """The plant with the bank of an architecture; None = with its own.
-
-    Raises
-    ------
-    ValueError
-        If the plant offers no choice, or not this one.
-    """
-    if architecture is None:
-        return plant
-    name = plant.name
-    if not isinstance(plant, OffersArchitectures):
-        raise ValueError(f"plant {name!r} has one architecture only; leave the choice out")
-    if architecture not in plant.architectures:
-        raise ValueError(
-            f"plant {name!r} has no architecture {architecture!r}; it has {', '.join(plant.architectures)}"
-        )
-    return plant.with_architecture(architecture)
-
-
 @dataclass(frozen=True)
 class Exhibit(Shown):
     """A picture that a plant adds to its study: its ``path``, and what it shows as ``title`` and ``caption``."""

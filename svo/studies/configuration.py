@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from itertools import product
+from itertools import product, starmap
 from typing import Any
 
 import numpy as np
 
 from polytopes.shown import Shown
 from svo.checks import expect
-from svo.plant import HEALTHY, Plant, architecture_of, chosen_noise, in_architecture
+from svo.plant import HEALTHY, BankChoice, Plant, bank_choice, chosen_noise, with_bank
+from svo.plant.choice import ONLY_BANK
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Job:
         Seed of this run alone: ``svo simulate`` with it makes the same log.
     exemplary : bool
         Whether the run is the one of its kind whose samples are kept for the pictures.
-    architecture : str or None
-        Of the bank; None for a plant that has one kind of bank only.
+    bank : BankChoice
+        Which of the plant's banks.
     """
 
     run: int
@@ -38,7 +39,7 @@ class Job:
     noise: str
     seed: int
     exemplary: bool
-    architecture: str | None = None
+    bank: BankChoice = ONLY_BANK
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ class StudyConfiguration(Shown):
         The seed that all others are spawned from.
     architectures : tuple of str
         Of the plant's bank; empty for a plant that has one kind of bank only. All see the same flights.
+    models : tuple of str
+        Kinds of the observers' models, likewise.
     """
 
     plant: str
@@ -67,6 +70,7 @@ class StudyConfiguration(Shown):
     runs: int
     seed: int
     architectures: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         expect(self.runs >= 1, "runs", self.runs, "at least 1 run of each fault and profile")
@@ -74,8 +78,9 @@ class StudyConfiguration(Shown):
         for name in ("noise", "faults"):
             values = getattr(self, name)
             expect(values and len(set(values)) == len(values), name, values, "one or more different names")
-        several = self.architectures
-        expect(len(set(several)) == len(several), "architectures", several, "different names")
+        for name in ("architectures", "models"):
+            values = getattr(self, name)
+            expect(len(set(values)) == len(values), name, values, "different names")
 
     @classmethod
     def for_plant(
@@ -87,16 +92,18 @@ class StudyConfiguration(Shown):
         noise: Sequence[str] = (),
         faults: Sequence[str] = (),
         architectures: Sequence[str] = (),
+        models: Sequence[str] = (),
     ) -> StudyConfiguration:
         """A configuration checked against a plant.
 
         Without ``noise`` it has the plant's default noise set, without ``faults`` all faults and the fault-free runs,
-        without ``architectures`` the plant's own.
+        without ``architectures`` or ``models`` the plant's own.
 
         Raises
         ------
         ValueError
-            If the plant has no noise set, fault or architecture of a name; the message lists those that it has.
+            If the plant has no noise set, fault, architecture or kind of models of a name; the message lists those that
+            it has.
         """
         noise = tuple(noise) or plant.noise_sets[:1]
         faults = tuple(faults) or (HEALTHY, *plant.faults)
@@ -105,11 +112,14 @@ class StudyConfiguration(Shown):
         for name in faults:
             if name != HEALTHY:
                 check_fault(plant, name)
-        for name in architectures:
-            in_architecture(plant, name)
-        own = architecture_of(plant)
-        chosen = tuple(architectures) or (() if own is None else (own,))
-        return cls(plant=plant.name, noise=noise, faults=faults, runs=runs, seed=seed, architectures=chosen)
+        for choice in (*(BankChoice(name) for name in architectures), *(BankChoice(models=kind) for kind in models)):
+            with_bank(plant, choice)
+        own = bank_choice(plant)
+        names, kinds = (
+            tuple(asked) or (() if mine is None else (mine,))
+            for asked, mine in ((architectures, own.architecture), (models, own.models))
+        )
+        return cls(plant.name, noise, faults, runs, seed, architectures=names, models=kinds)
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> StudyConfiguration:
@@ -134,7 +144,7 @@ class StudyConfiguration(Shown):
         """The runs in their order.
 
         The seed of a run depends on the study's seed, on the run's place among those of its kind, and on nothing
-        else: neither on the number of runs nor on which faults, noise sets and architectures were chosen.
+        else: neither on the number of runs nor on which faults, noise sets and banks were chosen.
         """
         every = [(n, f, p) for n in plant.noise_sets for f, p in conditions(plant)]
         jobs: list[Job] = []
@@ -146,10 +156,15 @@ class StudyConfiguration(Shown):
             # 53 bits: an integer that JSON readers keep exactly.
             seeds = [int(c.generate_state(1, np.uint64)[0] >> np.uint64(11)) for c in parent.spawn(self.runs)]
             jobs += [
-                Job(len(jobs) + j, fault, profile, noise, seeds[i], exemplary=i == 0, architecture=architecture)
-                for j, (architecture, i) in enumerate(product(self.architectures or (None,), range(self.runs)))
+                Job(len(jobs) + j, fault, profile, noise, seeds[i], exemplary=i == 0, bank=bank)
+                for j, (bank, i) in enumerate(product(self.banks, range(self.runs)))
             ]
         return jobs
+
+    @property
+    def banks(self) -> tuple[BankChoice, ...]:
+        """Which banks see each run."""
+        return tuple(starmap(BankChoice, product(self.architectures or (None,), self.models or (None,))))
 
     def to_dict(self) -> dict[str, Any]:
         """A form for JSON; lists instead of tuples."""

@@ -83,6 +83,7 @@ def study_command(plant: Plant, configuration: Mapping[str, Any]) -> str:
     options = [f"--runs {configuration['runs']}", f"--seed {configuration['seed']}"]
     options += [f"--noise {name}" for name in configuration["noise"]]
     options += [f"--architecture {name}" for name in configuration.get("architectures", ())]
+    options += [f"--models {kind}" for kind in configuration.get("models", ())]
     if list(configuration["faults"]) != [HEALTHY, *plant.faults]:
         options += [f"--fault {name}" for name in configuration["faults"]]
     return f"svo study {configuration['plant']} {' '.join(options)} --out DIR"

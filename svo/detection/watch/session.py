@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.detection.bank_alarms import digest_of_alarm, source_of_bank
+from svo.detection.bank_alarms import alarm_of, source_of_bank
 from svo.detection.watch.lines import Line, Notice
 from svo.detection.watch.rows import RowReader
 from svo.detection.watch.timeline import Event, Row, Timeline
@@ -292,8 +292,8 @@ class Session:
         for name in (*self.names, GLOBAL):
             step = verdict.steps.get(name)
             if step is not None and step.certificate is not None and name not in alive and name not in self._dead:
-                model = digest_of_alarm(self._bank.observers[name], step.certificate)
-                new.append(Alarm(name, verdict.sample, self._time, step.certificate, origin, model))
+                observer = self._bank.observers[name]
+                new.append(alarm_of(name, verdict.sample, self._time, step.certificate, origin, observer))
         self._dead |= {alarm.observer: alarm.time for alarm in new}
         return new
 

@@ -17,15 +17,15 @@
     svg.style.width = `${width}px`;
   };
 
-  // Every run: one column a fault, profile, noise set and architecture; delays on a logarithmic scale.
+  // Every run: one column a fault, profile, noise set and bank; delays on a logarithmic scale.
   const everyRun = () => {
     const svg = document.getElementById("runs");
     const readout = document.getElementById("run");
     const runs = data.runs.filter((run) => run.fault !== "none");
     const several = (key) => new Set(runs.map((run) => run[key])).size > 1;
-    const noises = several("noise"), architectures = several("architecture");
+    const noises = several("noise"), banks = several("among");
     const kind = (run) => [run.fault, run.profile, ...(noises ? [run.noise] : []),
-      ...(architectures ? [`arch. ${run.architecture}`] : [])].join("\n");
+      ...(banks ? [run.among] : [])].join("\n");
     const kinds = [...new Set(runs.map(kind))];
     const reached = runs.flatMap((run) => [run.detect, run.isolate]).filter((value) => value > 0);
     if (!reached.length) reached.push(data.Ts);
@@ -39,7 +39,7 @@
       chosen = k;
       const run = runs[k];
       const notes = [run.as && run.as !== run.fault ? ` as ${run.as}` : "", run.false ? "; false alarm" : "", run.wrong ? "; wrong isolation" : ""];
-      const bank = run.architecture ? `, Architecture ${run.architecture}` : "";
+      const bank = run.bank ? `, ${run.bank}` : "";
       readout.textContent = `${run.fault}, ${run.profile}, ${run.noise} noise${bank}, run ${run.run}: detected ${seconds(run.detect)}, `
         + `isolated ${seconds(run.isolate)}${notes.join("")}. `;
       const fault = /^[\w.-]+$/.test(run.fault) ? run.fault : `"${run.fault}"`;
@@ -57,7 +57,7 @@
       const left = 50, top = 44, height = 260, never = 24;
       const column = Math.max(30, Math.min(78, (room(svg) - left - 8) / kinds.length));
       const upright = column < 62;
-      const lines = noises + architectures + 2;
+      const lines = noises + banks + 2;
       const width = Math.max(300, left + column * kinds.length + 8), foot = top + never + height;
       size(svg, width, foot + (upright ? 16 + 7 * Math.max(...kinds.map((name) => name.length)) : 10 + 15 * lines));
       const y = (value) => (value === null ? top : top + never + height * (high - Math.log10(value)) / (high - low));

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from polytopes.signatures import options_by_name
 from svo.checks import expect_kind
-from svo.plant import MonitoredPlant, in_architecture, load_plant, registered_plants
+from svo.plant import BankChoice, MonitoredPlant, load_plant, registered_plants, with_bank
 from svo.plant.description.plant import DescribedPlant, read_description
 from svo.store import digest_of, write_whole
 
@@ -16,7 +16,9 @@ SUFFIX = ".toml"
 
 
 @options_by_name
-def find_plant(name: str | Path, folder: str | Path = "", *, architecture: str | None = None) -> MonitoredPlant:
+def find_plant(
+    name: str | Path, folder: str | Path = "", *, architecture: str | None = None, models: str | None = None
+) -> MonitoredPlant:
     """A plant by the path of the TOML file that describes it, or by the name under which it is registered.
 
     Parameters
@@ -27,18 +29,21 @@ def find_plant(name: str | Path, folder: str | Path = "", *, architecture: str |
         What the path is relative to; the present folder by default.
     architecture : str, optional
         Of the bank, such as "I" or "II", where the plant offers a choice; by default the plant's own.
+    models : str, optional
+        Kind of the observers' models, such as "lpv" or "nonlinear", likewise.
 
     Raises
     ------
     TypeError
         If the name is no text and no path.
     ValueError
-        If no plant is registered by that name, the description has a mistake, or there is no such architecture.
+        If no plant is registered by that name, the description has a mistake, or there is no such architecture or kind
+        of models.
     OSError
         If the file cannot be opened.
     """
     expect_kind("name", name, (str, Path), "the name of a registered plant, or the path of a TOML file")
-    return in_architecture(_found(str(name), Path(folder)), architecture)
+    return with_bank(_found(str(name), Path(folder)), BankChoice(architecture, models))
 
 
 def _found(name: str, folder: Path) -> MonitoredPlant:

@@ -16,7 +16,8 @@ from polytopes import HPolytope
 from svo.checks import Array, expect_shape
 from svo.logs.log import Log
 from svo.observers.base import Step
-from svo.plant import Plant, fault_start
+from svo.plant import BankChoice, Plant, fault_start
+from svo.plant.choice import ONLY_BANK
 from svo.store.npz_file import read_npz
 from svo.studies.configuration import Job
 
@@ -37,7 +38,7 @@ class Exemplar:
     Attributes
     ----------
     fault, profile, noise : str
-    architecture : str or None
+    bank : BankChoice
     names : tuple of str
         The observers, "nominal" first.
     time : (K,) array
@@ -61,7 +62,7 @@ class Exemplar:
     upper: Array
     x: Array
     snapshots: tuple[Snapshot, ...]
-    architecture: str | None = None
+    bank: BankChoice = ONLY_BANK
 
     @property
     def last_falsification(self) -> int:
@@ -76,7 +77,7 @@ class Exemplar:
     def save(self, path: Path) -> None:
         """Write all of it as a compressed .npz without pickled objects."""
         header: dict[str, Any] = {"fault": self.fault, "profile": self.profile, "noise": self.noise}
-        header |= {"names": list(self.names), "architecture": self.architecture}
+        header |= {"names": list(self.names), "bank": list(self.bank)}
         header["snapshots"] = [{"sample": s.sample, "event": s.event, "sets": list(s.sets)} for s in self.snapshots]
         arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
         arrays |= {name: getattr(self, name) for name in ("time", "alive", "lower", "upper", "x")}
@@ -125,7 +126,7 @@ def _decode(data: Mapping[str, NDArray[Any]]) -> Exemplar:
         raise ValueError("a snapshot is not one of this run")
     fault, profile, noise = (str(header[name]) for name in ("fault", "profile", "noise"))
     return Exemplar(
-        fault, profile, noise, names, snapshots=snapshots, architecture=header["architecture"], **arrays
+        fault, profile, noise, names, snapshots=snapshots, bank=BankChoice(*header["bank"]), **arrays
     )  # fmt: skip
 
 
@@ -178,7 +179,7 @@ def follow(plant: Plant, job: Job, log: Log, alive: NDArray[np.bool_]) -> Exempl
     lower, upper = bounds[:, :, 0], bounds[:, :, 1]
     return Exemplar(
         job.fault, job.profile, job.noise, names, log.time, alive, lower, upper, log.x, tuple(snapshots),
-        job.architecture,
+        job.bank,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from svo.studies.drawing import Gallery
 from svo.studies.isolation import plots
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.summary import ConditionSummary
-from svo.studies.isolation.tables import architectures
+from svo.studies.isolation.tables import bank_titles
 from svo.studies.page import Picture
 
 if TYPE_CHECKING:
@@ -45,14 +45,13 @@ def _pictures(
         if plant.reference:
             text += " Diamonds: the paper's figures; triangles point down from its upper bounds."
         title = f"Times to detect and to isolate, {noise} noise"
-        banks = architectures(chosen)
-        draw = _delays if len(banks) == 1 else _architectures
+        banks = bank_titles(chosen)
+        draw = _delays if len(banks) == 1 else _banks
         yield gallery.save(f"delays_{file_name(noise)}", draw(plant, chosen), title, text)
-        for bank in banks:
-            shown = [e for e in exemplars if (e.noise, e.architecture) == (noise, bank) and e.fault != HEALTHY]
-            several = len(banks) > 1
-            where = f"{noise} noise" + (f", Architecture {bank}" if several else "")
-            yield from _of_runs(gallery, plant, shown, where, file_name(f"{noise}_{bank}" if several else noise))
+        for bank, title in banks.items():
+            shown = [e for e in exemplars if (e.noise, e.bank) == (noise, bank) and e.fault != HEALTHY]
+            where = ", ".join(filter(None, (f"{noise} noise", title and bank.title)))
+            yield from _of_runs(gallery, plant, shown, where, file_name("_".join(filter(None, (noise, title)))))
 
 
 def _of_runs(gallery: Gallery, plant: Plant, shown: Sequence[Exemplar], where: str, suffix: str) -> Iterator[Picture]:
@@ -74,12 +73,12 @@ def _of_runs(gallery: Gallery, plant: Plant, shown: Sequence[Exemplar], where: s
     yield gallery.save(f"bounds_{suffix}", _bounds(plant, slow), title, text)
 
 
-def _architectures(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
+def _banks(plant: Plant, summaries: Sequence[ConditionSummary]) -> Figure:
     conditions = len({(s.fault, s.profile) for s in summaries})
     figure = new_figure(max(6.5, 1.0 * conditions), 6.0)
     axes = figure.subplots(2, 1, sharex=True)
     for ax, event in zip(axes, ("detect", "isolate"), strict=True):
-        plots.plot_architectures(summaries, event, plant.Ts, plant.reference, ax)
+        plots.plot_banks(summaries, event, plant.Ts, plant.reference, ax)
         ax.set_ylabel(f"time to {event} [s]")
     _delay_legend(figure, plant, summaries)
     return figure

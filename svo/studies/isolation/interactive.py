@@ -15,6 +15,7 @@ from svo.plant import HEALTHY, Plant, fault_start
 from svo.studies.isolation.exemplar import Exemplar
 from svo.studies.isolation.plots import separating_states, time_window
 from svo.studies.isolation.run import RunRow
+from svo.studies.isolation.tables import bank_titles
 
 _FRAMES = 160  # samples of a run that the page holds; more would only make it heavier
 _DIGITS = 6
@@ -34,13 +35,16 @@ def interactive_section(plant: Plant, rows: Sequence[RunRow], exemplars: Iterabl
     flights = [_flight(plant, e) for e in exemplars if e.fault != HEALTHY]
     if not flights:
         return Markup()
-    data = {"plant": plant.name, "Ts": plant.Ts, "runs": [_run(row) for row in rows], "flights": flights}
+    among = bank_titles(rows)
+    runs = [_run(row, among[row.bank]) for row in rows]
+    data = {"plant": plant.name, "Ts": plant.Ts, "runs": runs, "flights": flights}
     # "<" cannot end the script element from inside a string.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return render("interactive.html.j2", flights=flights, data=text)
 
 
-def _run(row: RunRow) -> dict[str, Any]:
+def _run(row: RunRow, among: str) -> dict[str, Any]:
+    """One run, and how its bank is told from others."""
     return {
         "run": row.run,
         "seed": row.seed,
@@ -52,7 +56,8 @@ def _run(row: RunRow) -> dict[str, Any]:
         "as": row.isolated_as,
         "false": row.false_alarm,
         "wrong": row.wrong_isolation,
-        "architecture": row.architecture,
+        "bank": row.bank.title,
+        "among": among,
     }
 
 
@@ -78,9 +83,9 @@ def _flight(plant: Plant, exemplar: Exemplar) -> dict[str, Any]:
         }
         for i, name in enumerate(exemplar.names)
     ]
-    bank = f", Architecture {exemplar.architecture}" if exemplar.architecture else ""
+    of = exemplar.fault, exemplar.profile, f"{exemplar.noise} noise", exemplar.bank.title
     return {
-        "title": f"{exemplar.fault}, {exemplar.profile}, {exemplar.noise} noise" + bank,
+        "title": ", ".join(filter(None, of)),
         "axes": [plant.columns.states[i].bounded for i in states],
         "time": _numbers(after[kept]),
         "true": _numbers(exemplar.x[kept][:, states]),

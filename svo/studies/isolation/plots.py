@@ -11,6 +11,7 @@ import numpy as np
 from svo.logs.names import Column
 from svo.pictures.style import COLOURS, axes_or_new, colours, in_seconds
 from svo.plant import HEALTHY, Reference
+from svo.plant.choice import what_differs
 from svo.studies.isolation.exemplar import Exemplar, Snapshot
 from svo.studies.isolation.summary import ConditionSummary
 from svo.studies.statistics import Delays
@@ -48,26 +49,26 @@ def plot_delays(
     return artists
 
 
-def plot_architectures(
+def plot_banks(
     summaries: Sequence[ConditionSummary],
     event: str,
     Ts: float,
     reference: Mapping[tuple[str, str], Reference] | None = None,
     ax: Axes | None = None,
 ) -> list[Artist]:
-    """Mean times to "detect" or "isolate" as points, the architectures side by side; otherwise as `plot_delays`."""
+    """Mean times to "detect" or "isolate" as points, the banks side by side; otherwise as `plot_delays`."""
     ax = axes_or_new(ax, 6.4, 4.8)
     faulty = [s for s in summaries if s.fault != HEALTHY]
     conditions = list(dict.fromkeys((s.fault, s.profile) for s in faulty))
-    banks = list(dict.fromkeys(s.architecture for s in faulty))
+    banks = list(dict.fromkeys(s.bank for s in faulty))
     width = 0.76 / len(banks)
     artists: list[Artist] = []
-    for i, bank in enumerate(banks):
-        chosen = [s for s in faulty if s.architecture == bank]
+    for i, (bank, differs) in enumerate(zip(banks, what_differs(banks), strict=True)):
+        chosen = [s for s in faulty if s.bank == bank]
         at = np.array([conditions.index((s.fault, s.profile)) for s in chosen]) + (i - (len(banks) - 1) / 2) * width
         delays = [getattr(s, event) for s in chosen]
         tone = COLOURS[1 + (i + 1) % (len(COLOURS) - 1)]
-        artists += _points(ax, at, delays, Ts / 2, tone, f"Architecture {bank}")
+        artists += _points(ax, at, delays, Ts / 2, tone, differs.title)
     marks = [(reference or {}).get(key) for key in conditions]
     artists += _reference_marks(
         ax, np.arange(len(conditions), dtype=float), [getattr(m, event) if m else "" for m in marks]

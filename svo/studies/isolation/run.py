@@ -10,7 +10,7 @@ from svo.detection.bank_alarms import alarms_of, source_of_bank
 from svo.indices import judge_alarm
 from svo.isolation import Alarm, BankRecord
 from svo.logs.log import Log
-from svo.plant import HEALTHY, Plant, first_faulty_sample, in_architecture
+from svo.plant import HEALTHY, BankChoice, Plant, first_faulty_sample, with_bank
 from svo.studies.configuration import Job
 from svo.studies.isolation.exemplar import Exemplar, follow
 from svo.studies.runs import registered_plant
@@ -49,6 +49,8 @@ class RunRow:
         Programs of observers that ended at a limit, so that sets are wider.
     architecture : str or None
         Of the bank; None for a plant that has one kind of bank only.
+    models : str or None
+        Kind of the observers' models, likewise.
     error : str or None
         Why the run failed; None if it did not.
     """
@@ -70,12 +72,18 @@ class RunRow:
     undecided: int | None = None
     stopped: int | None = None
     architecture: str | None = None
+    models: str | None = None
     error: str | None = None
 
     @classmethod
     def failed(cls, job: Job, error: str) -> RunRow:
         """The row of a run that failed."""
-        return cls(job.run, job.seed, job.fault, job.profile, job.noise, architecture=job.architecture, error=error)
+        return cls(job.run, job.seed, job.fault, job.profile, job.noise, error=error, **job.bank._asdict())
+
+    @property
+    def bank(self) -> BankChoice:
+        """Which of the plant's banks it was."""
+        return BankChoice(self.architecture, self.models)
 
 
 @dataclass(frozen=True)
@@ -94,7 +102,7 @@ def run_registered(plant: str, job: Job) -> RunOutcome:
 
 def execute(plant: Plant, job: Job) -> RunOutcome:
     """Simulate one run and judge it; bit for bit the same for the same job, times of computation aside."""
-    plant = in_architecture(plant, job.architecture)
+    plant = with_bank(plant, job.bank)
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     bank = plant.bank(job.noise)
     record = bank.run(log)
@@ -130,7 +138,7 @@ def judge(plant: Plant, job: Job, log: Log, record: BankRecord) -> RunRow:
         microseconds_p99=float(np.quantile(seconds, 0.99) * 1e6),
         undecided=int(record.undecided.sum()),
         stopped=int(record.stopped.sum()),
-        architecture=job.architecture,
+        **job.bank._asdict(),
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from svo.plant import HEALTHY
+from svo.plant import HEALTHY, BankChoice
 from svo.store import write_csv
 from svo.studies.isolation.run import RunRow
 from svo.studies.statistics import Delays, Share, grouped
@@ -34,6 +34,8 @@ class ConditionSummary:
         Programs of observers that ended at a limit, in all runs.
     architecture : str or None
         Of the bank; None for a plant that has one kind of bank only.
+    models : str or None
+        Kind of the observers' models, likewise.
     """
 
     noise: str
@@ -50,14 +52,20 @@ class ConditionSummary:
     undecided: int
     stopped: int
     architecture: str | None = None
+    models: str | None = None
+
+    @property
+    def bank(self) -> BankChoice:
+        """Which of the plant's banks it was."""
+        return BankChoice(self.architecture, self.models)
 
 
 def summarise(rows: Iterable[RunRow]) -> list[ConditionSummary]:
-    """One summary per noise set, fault, profile and architecture, in the order of their first runs.
+    """One summary per noise set, fault, profile and bank, in the order of their first runs.
 
     Runs that failed are left out.
     """
-    groups = grouped(rows, "noise", "fault", "profile", "architecture")
+    groups = grouped(rows, "noise", "fault", "profile", "bank")
     return [_summarise(key, group) for key, group in groups.items()]
 
 
@@ -71,8 +79,8 @@ def to_json(summaries: Iterable[ConditionSummary]) -> list[dict[str, Any]]:
     return [asdict(summary) for summary in summaries]
 
 
-def _summarise(condition: tuple[str, str, str, str | None], rows: list[RunRow]) -> ConditionSummary:
-    noise, fault, profile, architecture = condition
+def _summarise(condition: tuple[str, str, str, BankChoice], rows: list[RunRow]) -> ConditionSummary:
+    noise, fault, profile, bank = condition
     kept = Counter(row.alive_end or "none" for row in rows if fault != HEALTHY and row.isolation_delay_s is None)
     return ConditionSummary(
         noise=noise,
@@ -88,7 +96,7 @@ def _summarise(condition: tuple[str, str, str, str | None], rows: list[RunRow]) 
         microseconds_p99=float(np.median([row.microseconds_p99 or 0.0 for row in rows])),
         undecided=sum(row.undecided or 0 for row in rows),
         stopped=sum(row.stopped or 0 for row in rows),
-        architecture=architecture,
+        **bank._asdict(),
     )
 
 
@@ -102,7 +110,7 @@ def _flat(summary: ConditionSummary) -> dict[str, Any]:
     row |= _flat_share("false_alarm", summary.false_alarms) | _flat_share("wrong_isolation", summary.wrong_isolations)
     row["not_isolated_share"] = 1 - summary.isolate.reached.value
     row["survivors"] = "; ".join(f"{names}: {count}" for names, count in summary.survivors.items())
-    for name in ("microseconds_median", "microseconds_p99", "undecided", "stopped", "architecture"):
+    for name in ("microseconds_median", "microseconds_p99", "undecided", "stopped", "architecture", "models"):
         row[name] = getattr(summary, name)
     return row
 

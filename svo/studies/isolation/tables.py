@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Protocol
 
 import numpy as np
 
 from svo.pages.tables import TextTable
-from svo.plant import HEALTHY, Plant
+from svo.plant import HEALTHY, BankChoice, Plant
+from svo.plant.choice import what_differs
 from svo.studies.isolation.summary import ConditionSummary
 from svo.studies.statistics import Delays, Share
 
@@ -21,18 +23,27 @@ def delay_table(plant: Plant, summaries: Sequence[ConditionSummary]) -> TextTabl
     Each delay is given as mean over the runs that reached it, median and 5-95 % range over all runs (an infinity
     sign where the quantile falls among those that did not), and the number of runs that reached it.
     """
-    several = len(architectures(summaries)) > 1
-    header = ["fault", "profile", *["arch."] * several]
+    titles = bank_titles(summaries)
+    several = len(titles) > 1
+    header = ["fault", "profile", *["bank"] * several]
     for event in ("detect", "isolate"):
         header += [f"{event} [s]\nmean", "\nmedian", "\n5–95 %", "\nruns"] + ["\npaper"] * bool(plant.reference)
     header += ["false\nalarms", "wrong\nisol."]
-    rows = [_delay_row(plant, summary, several) for summary in summaries]
+    rows = [_delay_row(plant, summary, [titles[summary.bank]] * several) for summary in summaries]
     return TextTable(f"{summaries[0].noise} noise: {plant.title}", tuple(header), tuple(rows), labels=2 + several)
 
 
-def architectures(summaries: Iterable[ConditionSummary]) -> tuple[str | None, ...]:
-    """Architectures of the banks, in order."""
-    return tuple(dict.fromkeys(s.architecture for s in summaries))
+class OfBank(Protocol):
+    """A row or a summary of runs of one bank."""
+
+    @property
+    def bank(self) -> BankChoice: ...
+
+
+def bank_titles(of_banks: Iterable[OfBank]) -> dict[BankChoice, str]:
+    """The banks, in order, each with what tells it from the others in a few letters; a single one needs none."""
+    banks = list(dict.fromkeys(s.bank for s in of_banks))
+    return dict(zip(banks, (", ".join(filter(None, own)) for own in what_differs(banks)), strict=True))
 
 
 def not_isolated(summaries: Sequence[ConditionSummary]) -> list[str]:
@@ -42,7 +53,7 @@ def not_isolated(summaries: Sequence[ConditionSummary]) -> list[str]:
         if s.survivors:
             who = "; ".join(f"{names} ({count})" for names, count in s.survivors.items())
             runs = f"{sum(s.survivors.values())} of {s.runs} runs"
-            where = f"{s.noise} noise" + (f", Architecture {s.architecture}" if s.architecture else "")
+            where = ", ".join(filter(None, (f"{s.noise} noise", s.bank.title)))
             lines.append(f"not isolated, {where}: {s.fault} {s.profile} in {runs}; alive at the end: {who}")
     return lines
 
@@ -83,13 +94,13 @@ def total(shares: Iterable[Share]) -> Share:
     return Share(sum(s.count for s in every), sum(s.of for s in every))
 
 
-def _delay_row(plant: Plant, summary: ConditionSummary, with_architecture: bool) -> tuple[str, ...]:
+def _delay_row(plant: Plant, summary: ConditionSummary, bank: Sequence[str]) -> tuple[str, ...]:
     reference = plant.reference.get((summary.fault, summary.profile))
     row = [
         "no fault" if summary.fault == HEALTHY else summary.fault,
         "" if summary.fault == HEALTHY else summary.profile,
     ]
-    row += [summary.architecture or ""] * with_architecture
+    row += bank
     for event, delays in (("detect", summary.detect), ("isolate", summary.isolate)):
         row += [""] * 4 if summary.fault == HEALTHY else _delay_cells(delays, plant.Ts)
         if plant.reference:

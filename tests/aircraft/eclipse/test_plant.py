@@ -1,5 +1,7 @@
 """The Eclipse as a registered plant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from aircraft.eclipse.trim import level_trim
 from polytopes import HPolytope
 from svo.isolation.architectures import ArchitectureII
 from svo.logs.drive import drive
-from svo.plant import Plant, architecture_of, in_architecture, load_plant
+from svo.plant import BankChoice, Plant, architecture_of, bank_choice, in_architecture, load_plant, with_bank
 
 PLANT = eclipse()
 
@@ -125,6 +127,19 @@ def test_the_bank_of_the_other_architecture_starts_its_fault_observers_at_the_de
     assert record.fault == "elevator"
     assert states[:50] == ["nominal"] * 50
     assert record.died_at["elevator"] is None
+
+
+def test_the_bank_of_the_simulators_equations_sees_the_same_flight_without_a_schedule():
+    linear, exact = (with_bank(PLANT, BankChoice(models=kind)) for kind in ("lpv", "nonlinear"))
+    assert (bank_choice(linear), bank_choice(exact)) == (BankChoice("I", "lpv"), BankChoice("I", "nonlinear"))
+    log = exact.simulate("elevator", "step", "quiet", 11)
+    np.testing.assert_array_equal(log.y, linear.simulate("elevator", "step", "quiet", 11).y)
+    assert log.schedule is None
+    record = exact.bank("quiet").run(replace(log, time=log.time[:60], u=log.u[:60], y=log.y[:60], x=log.x[:60]))
+    assert (record.detected_at, record.isolated_at, record.fault) == (51, 51, "elevator")
+    assert exact.bank("quiet").observers["nominal"].model is exact.bank("quiet").observers["nominal"].model
+    with pytest.raises(ValueError, match="model_kind is 'cubic'; expected 'lpv' or 'nonlinear'"):
+        Eclipse(model_kind="cubic")
 
 
 def test_an_excited_flight_follows_the_input_that_is_superposed():

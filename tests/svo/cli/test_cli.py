@@ -339,8 +339,11 @@ def test_a_plant_with_one_bank_has_no_architectures(log: Path, tmp_path: Path) -
     for command in (["detect", "tank", log], ["study", "tank", "--out", tmp_path / "study"]):
         message = one_line(svo(*command, "--architecture", "II"))
         assert "plant 'tank' has one architecture only" in message
+        assert "plant 'tank' has one kind of models only" in one_line(svo(*command, "--models", "lpv"))
     unknown = svo("study", "eclipse", "--architecture", "III", "--out", tmp_path / "study")
     assert "plant 'eclipse' has no architecture 'III'; it has I, II" in one_line(unknown)
+    unknown = svo("detect", "eclipse", log, "--models", "cubic")
+    assert "plant 'eclipse' has no kind of models 'cubic'; it has lpv, nonlinear" in one_line(unknown)
 
 
 def test_both_architectures_see_the_same_runs_side_by_side(registered_tank: str, tmp_path: Path) -> None:
@@ -363,6 +366,31 @@ def test_both_architectures_see_the_same_runs_side_by_side(registered_tank: str,
     assert (out / "delays_calm.png").exists()
     assert (out / "alive_calm_II.png").exists()
     assert svo("verify", out / "alarms.jsonl").exit_code == 0
+
+
+def test_both_kinds_of_models_see_the_same_runs_side_by_side(registered_tank: str, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    options = ["--runs", "2", "--workers", "1", "--fault", "gauge", "--models", "lpv", "--models", "nonlinear"]
+    result = svo("study", "tank2", *options, "--out", out)
+    assert result.exit_code == 0, result.output
+    table = [line.split() for line in result.stdout.splitlines() if line.strip().startswith("gauge")]
+    assert [row[:3] for row in table] == [["gauge", "step", kind] for kind in ("lpv", "nonlinear")]
+    linear, other = ([row for row in StudyFolder(out).rows() if row.models == kind] for kind in ("lpv", "nonlinear"))
+    for a, b in zip(linear, other, strict=True):
+        assert (a.seed, a.detection_delay_s, a.isolated_as) == (b.seed, b.detection_delay_s, b.isolated_as)
+    assert "--models lpv --models nonlinear" in (out / "report.html").read_text()
+    assert (out / "bounds_calm_nonlinear.png").exists()
+    assert svo("verify", out / "alarms.jsonl").exit_code == 0
+
+
+def test_an_alarm_is_compared_with_the_models_of_its_own_bank(log: Path, tmp_path: Path) -> None:
+    for kind, words in (("lpv", ""), ("nonlinear", "is not checked again")):
+        assert svo("detect", "tank2", log, "--models", kind, "--out", tmp_path / kind).exit_code == 0
+        alarms = tmp_path / kind / "alarms.jsonl"
+        assert {json.loads(line)["source"]["models"] for line in alarms.read_text().splitlines()} == {kind}
+        result = svo("verify", alarms, "--log", log)
+        assert result.exit_code == 0, result.output
+        assert words in result.stdout
 
 
 def test_the_chain_of_a_model_that_starts_late_is_proven_from_its_start(registered_tank: str, tmp_path: Path) -> None:

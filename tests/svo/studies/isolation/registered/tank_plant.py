@@ -19,6 +19,7 @@ from svo.isolation.architectures import ArchitectureI, ArchitectureII
 from svo.isolation.bank import Bank
 from svo.logs.log import Log
 from svo.models.model import UncertainModel, Uncertainty
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.observer import WindowObserver
 from svo.plant import Column, Columns, Reference
 
@@ -104,21 +105,42 @@ def tank() -> Tank:
 
 @dataclass(frozen=True)
 class TankOfTwoBanks(Tank):
-    """The same tank, whose gauge's observer may start at the detection instead."""
+    """The same tank, whose gauge's observer may start at the detection instead, and whose models may be nonlinear."""
 
     name: str = "tank2"
     architecture: str = "I"
     architectures: tuple[str, ...] = ("I", "II")
+    model_kind: str = "lpv"
+    model_kinds: tuple[str, ...] = ("lpv", "nonlinear")
 
     def with_architecture(self, architecture: str) -> TankOfTwoBanks:
         return replace(self, architecture=architecture)
 
+    def with_models(self, kind: str) -> TankOfTwoBanks:
+        return replace(self, model_kind=kind)
+
     def bank(self, noise: str) -> Bank:
-        first = super().bank(noise)
+        first = super().bank(noise) if self.model_kind == "lpv" else self._nonlinear(noise)
         if self.architecture == "I":
             return first
         faults = {name: first.observers[name] for name in ("leak", "gauge")}
         return ArchitectureII(first.observers["nominal"], faults, HPolytope.box([0.0], [3.0]), class_one=("leak",))
+
+    def _nonlinear(self, noise: str) -> ArchitectureI:
+        """The same equations, written down as functions."""
+        disturbance, error = BOUNDS[noise]
+        nominal = NonlinearModel(
+            lambda x, u, w: [0.98 * x[0] + 0.05 * u[0] + w[0]], lambda x: [x[0], x[0]], states=["level"],
+            inputs=["inflow"], disturbances=["rain"], w=[disturbance], n=[error, error], Ts=self.Ts,
+            largest=([0.0], [3.0]), continuous=False,
+        )  # fmt: skip
+        leak = nominal.replace(
+            f=lambda x, u, w, p: [(0.98 - p[0]) * x[0] + 0.05 * u[0] + w[0]], parameters={"leak": (0, LEAK)}
+        )
+        models = {"nominal": nominal, "leak": leak, "gauge": nominal.replace(n=[error + BIAS, error])}
+        start = HPolytope.box([0.0], [3.0])
+        observers = {name: WindowObserver(model, start, horizon=5) for name, model in models.items()}
+        return ArchitectureI(observers.pop("nominal"), observers)
 
 
 def tank_of_two_banks() -> TankOfTwoBanks:
