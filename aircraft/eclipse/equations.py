@@ -19,7 +19,7 @@ from aircraft.eclipse.models import NAMES, SPEED_MOMENT_INCREASE
 from aircraft.eclipse.noise import NoiseSet
 from aircraft.eclipse.scenarios import Fault
 from aircraft.eclipse.simulator import Surrogate
-from svo.faults import ActuatorFault, SensorFault
+from svo.faults import ParameterFault, PlantFault
 from svo.functions import atan2, cos, sin, sqrt
 from svo.models.nonlinear import NonlinearModel
 
@@ -46,38 +46,32 @@ class Equations:
     moment_reference: float = 0.0
 
     def healthy(self, x: Any, u: Any, w: Any) -> Rows:
-        """The aircraft without faults."""
-        return self._rates(x, u[0], u[1], w)
-
-    def elevator(self, x: Any, u: Any, w: Any, p: Any) -> Rows:
-        """With a share p[0] of the elevator's command lost."""
-        return self._rates(x, u[0] - p[0] * u[0], u[1], w)
+        """The aircraft without faults, w being the gusts."""
+        s, (eta, tau) = self.surrogate, u
+        *_, force, torque, half_chord, gravity, thrust, thrust_moment = s.packed().tolist()
+        along, across, theta, q = x
+        squared = along**2 + across**2
+        speed, alpha = sqrt(squared), atan2(across, along)
+        lift = s.CL0 + s.CLa * alpha + s.CLe * eta
+        drag = s.CD0 + s.k * lift**2 + s.CDe * eta
+        aero_x, aero_z = speed * (lift * across - drag * along), speed * (lift * along + drag * across)
+        du = force * aero_x + thrust * tau - s.k_r * along - gravity * sin(theta) - q * across + w[0]
+        dw = gravity * cos(theta) - force * aero_z + s.normal_coupling * q * along + w[1]
+        moment = squared * (s.Cma * alpha + s.Cme * eta) + s.Cmq * half_chord * (speed * q)
+        return [du, dw, q, torque * moment + thrust_moment * tau + s.M_wdot * dw + w[2]]
 
     def dynamics(self, x: Any, u: Any, w: Any, p: Any) -> Rows:
         """With M_u increased by p[0] times 30 %."""
         M = self.derivatives.polynomials["M_u"]
         squared = x[0] ** 2 + x[1] ** 2
         of_speed = (M[0] * squared + M[1] * sqrt(squared) + M[2]) * (x[0] - self.moment_reference)
-        *others, rate = self._rates(x, u[0], u[1], w)
+        *others, rate = self.healthy(x, u, w)
         return [*others, rate + p[0] * (SPEED_MOMENT_INCREASE * of_speed)]
 
     @staticmethod
     def measured(x: Any) -> Rows:
         """[V, alpha, theta, q]."""
         return [sqrt(x[0] ** 2 + x[1] ** 2), atan2(x[1], x[0]), x[2], x[3]]
-
-    def _rates(self, x: Any, eta: Any, tau: Any, d: Any) -> Rows:
-        s = self.surrogate
-        *_, force, torque, half_chord, gravity, thrust, thrust_moment = s.packed().tolist()
-        u, w, theta, q = x
-        squared = u**2 + w**2
-        speed, alpha = sqrt(squared), atan2(w, u)
-        lift = s.CL0 + s.CLa * alpha + s.CLe * eta
-        drag = s.CD0 + s.k * lift**2 + s.CDe * eta
-        du = force * (speed * (lift * w - drag * u)) + thrust * tau - s.k_r * u - gravity * sin(theta) - q * w + d[0]
-        dw = gravity * cos(theta) - force * (speed * (lift * u + drag * w)) + s.normal_coupling * q * u + d[1]
-        moment = squared * (s.Cma * alpha + s.Cme * eta) + s.Cmq * half_chord * (speed * q)
-        return [du, dw, q, torque * moment + thrust_moment * tau + s.M_wdot * dw + d[2]]
 
 
 def nonlinear_models(
@@ -106,10 +100,6 @@ def nonlinear_models(
 
 def _with(fault: Fault, nominal: NonlinearModel, equations: Equations) -> NonlinearModel:
     """The aircraft with a fault of any size up to its own."""
-    if isinstance(fault, SensorFault):
-        n = nominal.noise.copy()
-        n[fault.where] += abs(fault.magnitude)
-        return nominal.replace(n=n)
-    if isinstance(fault, ActuatorFault):
-        return nominal.replace(f=equations.elevator, parameters={"lost share": (0.0, fault.magnitude or 0.0)})
-    return nominal.replace(f=equations.dynamics, parameters={"increase of M_u": (0.0, fault.magnitude)})
+    if not isinstance(fault, PlantFault):
+        return fault.model(nominal)
+    return ParameterFault("increase of M_u", fault.magnitude, fault.profile, f=equations.dynamics).model(nominal)
