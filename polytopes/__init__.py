@@ -2,6 +2,7 @@
 
 from polytopes.certificate import Certificate
 from polytopes.containment import Containment
+from polytopes.distance import Distance
 from polytopes.emptiness import Emptiness
 from polytopes.errors import EmptySetError, ProjectionLimitError, UnboundedError, UndecidedError
 from polytopes.generators import Generators
@@ -16,6 +17,7 @@ __all__ = [
     "Ball",
     "Certificate",
     "Containment",
+    "Distance",
     "Emptiness",
     "EmptySetError",
     "Generators",

@@ -13,7 +13,7 @@ from polytopes.checks import Floats
 from polytopes.duality import equality_multipliers
 from polytopes.errors import UndecidedError
 from polytopes.integers import up
-from polytopes.linear_program import Maxima, Program
+from polytopes.linear_program import Maxima
 from polytopes.outward_normals import support_of
 from polytopes.rows import Rows
 from polytopes.support import maxima
@@ -113,15 +113,15 @@ def _proved_reach(values: Floats, constant: Floats, weights: Floats) -> Floats |
 def exact_supports(P: Rows, directions: Floats) -> list[Fraction] | None:
     """Exact supports of a nonempty set along directions in which it is bounded; None if that costs too much."""
     exact = P.exact
-    found = _by_simplex(P.program, directions) if exact is None else [support_of(exact, row) for row in directions]
+    found = [exact_maximum_of(P, row) if exact is None else support_of(exact, row) for row in directions]
     fractions = [value for value in found if isinstance(value, Fraction)]
     return fractions if len(fractions) == len(directions) else None
 
 
-def _by_simplex(program: Program, directions: Floats) -> list[Fraction]:
-    """Those with which the rational simplex ends."""
-    start = program.exact.feasible(program.interior.point) if program.exact.affordable else None
-    if start is None or start.status != "reached":
-        return []
-    best = [program.exact.maximum(row, start.point) for row in directions]
-    return [Fraction(int(outcome.value.p), int(outcome.value.q)) for outcome in best if outcome.status == "optimal"]
+def exact_maximum_of(P: Rows, direction: Floats) -> Fraction | None:
+    """The exact maximum of a linear form over a nonempty set, by the rational simplex; None if it did not end there."""
+    start = P.program.exact_point
+    if start is None:
+        return None
+    outcome = P.program.exact.maximum(direction, start)
+    return Fraction(int(outcome.value.p), int(outcome.value.q)) if outcome.status == "optimal" else None

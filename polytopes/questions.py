@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polytopes import containment, sampling, separation
+from polytopes import distance as distances
 from polytopes import support as support_functions
 from polytopes.affine_hull import affine_dim
 from polytopes.checks import Floats, real_array, real_number, whole_number
 from polytopes.containment import Containment
+from polytopes.distance import Distance
 from polytopes.emptiness import Emptiness
 from polytopes.generators import Generators, generators
 from polytopes.inner_box import inner_box
@@ -154,6 +156,52 @@ class Questions(Rows):
         """
         return separation.intersects(self, same_space(self, Q))
 
+    def closest_point(self, x: ArrayLike) -> Floats:
+        """The point (n,) of the set with the least Euclidean distance from x (n,).
+
+        By an active set; its rows are then solved for in rationals, so that the point is right to rounding.
+
+        Raises
+        ------
+        EmptySetError
+            If the set is empty.
+        """
+        return distances.closest_point(self, real_array("x", x, (self.dim,)))
+
+    @options_by_name
+    def distance(self, x: ArrayLike | Rows, *, norm: float = 2) -> Distance:
+        """``min |y - x|`` over the points y of this set, from a point (n,) or from all points x of a set.
+
+        Parameters
+        ----------
+        x : array_like (n,) or HPolytope
+        norm : {2, 1, numpy.inf}
+            2: a quadratic program by an active set; 1 and inf: a linear program.
+
+        Returns
+        -------
+        Distance
+            A float, 0 exactly if they meet and inf if a set is empty, with the points that it is between and bounds.
+        """
+        kind = _norm(norm)
+        if isinstance(x, Rows):
+            return distances.distance_to_set(self, same_space(self, x), kind)
+        return distances.distance_to_point(self, real_array("x", x, (self.dim,)), kind)
+
+    @options_by_name
+    def hausdorff(self, Q: Rows, *, norm: float = 2) -> float:
+        """The distance that no point of one set is farther from the other: ``max(max_P d(x, Q), max_Q d(x, P))``.
+
+        One distance for each vertex of both.  Unbounded sets are at a finite distance if they have the same rays and
+        lines, decided exactly; two empty sets are at distance 0, and one is at distance inf from any other set.
+
+        Parameters
+        ----------
+        Q : HPolytope
+        norm : {2, 1, numpy.inf}
+        """
+        return distances.hausdorff(self, same_space(self, Q), _norm(norm))
+
     @options_by_name
     def equals(self, Q: Rows, *, tol: float = 1e-9) -> bool:
         """Whether this set and Q contain each other within `tol` (see `contains`)."""
@@ -214,3 +262,11 @@ class Questions(Rows):
         if not isinstance(rng, np.random.Generator):
             raise TypeError(f"rng is a {type(rng).__name__}; expected a numpy.random.Generator: default_rng(seed).")
         return sampling.random_points(self, whole_number("count", count, least=0), rng)
+
+
+def _norm(norm: float) -> float:
+    """1, 2 or inf; ValueError otherwise."""
+    kind = real_number("norm", norm, finite=False)
+    if kind not in distances.NORMS:
+        raise ValueError(f"norm is {norm!r}; expected 1, 2 or numpy.inf.")
+    return kind

@@ -36,7 +36,7 @@ def callables() -> dict[str, tuple[Callable[..., Any], str]]:
         for method, value in inspect.getmembers(item, inspect.isroutine):
             if method.startswith("_") or not callable(value):
                 continue
-            if getattr(value, "__module__", "").split(".")[0] in ("svo", "polytopes"):
+            if str(getattr(value, "__module__", "")).split(".")[0] in ("svo", "polytopes"):
                 found[f"{name}.{method}"] = value, inspect.getdoc(value) or ""
     return found
 

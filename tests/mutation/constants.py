@@ -126,6 +126,7 @@ CONSTANTS = (
     Constant("polytopes.affine_image", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.preimage", "_EPS", "outward", f"{SETS}/test_outward.py"),
     Constant("polytopes.inclusion", "_EPS", "outward", f"{SETS}/test_operators.py"),
+    Constant("polytopes.distance", "_EPS", "outward", f"{SETS}/test_distances.py"),
     Constant("polytopes.normalisation", "_EPS", "outward", f"{SETS}/test_operators.py"),
     Constant("core/polytopes/centre.c", "EPS", "outward", ROUNDED),
     Constant("svo.logs.columns", "TIME_TOLERANCE", "tolerance", "tests/svo/logs/test_log_file.py"),
@@ -173,6 +174,7 @@ CONSTANTS = (
     Constant("polytopes.frame", "_NOISE", "heuristic"),
     Constant("polytopes.hull", "_SLIVER", "heuristic"),
     Constant("polytopes.exact", "_CANCELLING", "heuristic"),
+    Constant("polytopes.least_distance", "_STILL", "heuristic"),
     Constant("polytopes.exact_generators", "_WIDE", "heuristic"),
     Constant("polytopes.plotting", "_REACH", "heuristic"),
 )
