@@ -206,6 +206,8 @@ def _no_explanation(chosen: Sequence[Bound], first: int, count: int, is_exact: b
 def _check_log(model: UncertainModel, log: Log) -> None:
     expect_model("model", model)
     expect_log(log)
+    if log.events:
+        raise ValueError("the log keeps its own times (Log.events); calibrate takes samples of the model's Ts")
     for name, count in (("u", model.n_inputs), ("y", model.n_outputs)):
         array = getattr(log, name)
         expect_shape(array.shape[1] == count, f"{name} of the log", array, f"({len(log)}, {count})")

@@ -5,7 +5,7 @@
 - NaN (or an empty cell, or null) in an output means that this sensor is missing at that sample; in a state, that
   it is unknown. In time and inputs it is an error, and so is Inf anywhere.
 - Time increases by the model's sampling time, within 1 % of it, from row to row. A sample that was lost
-  must stand in the log as a row whose sensor cells are empty.
+  must stand in the log as a row whose sensor cells are empty. A log that keeps its own times has any steps.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def not_there(where: str) -> ValueError:
     )
 
 
-def checked_parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float) -> dict[str, Any]:
+def checked_parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float | None) -> dict[str, Any]:
     """`parts` of whole columns of numbers, (K,) each, of which `wanted_columns` are there, once they are checked.
 
     Raises
@@ -124,30 +124,36 @@ def check_cells(source: str, cells: Mapping[str, Array], columns: Columns, place
             raise not_there(where) if np.isnan(values[k]) else not_finite(where, float(values[k]))
 
 
-def parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float, place: Place) -> dict[str, Any]:
-    """The arguments of a `Log`, from columns whose cells have been checked; ``place`` says where a sample stands."""
+def parts(source: str, cells: Mapping[str, Array], columns: Columns, Ts: float | None, place: Place) -> dict[str, Any]:
+    """The arguments of a `Log`, from columns whose cells have been checked; ``place`` says where a sample stands.
+
+    Without ``Ts`` it keeps its own times.
+    """
     time = cells[columns.time]
     if not len(time):
         raise ValueError(f"{source} has a header but no samples; expected one row a sample")
     check_times(time, Ts, lambda k: f"{source}, {place(k)}, column {columns.time!r}")
     y, u, x = (_stack(cells, group, len(time)) for group in (columns.outputs, columns.inputs, columns.states))
     has_states = columns.states and columns.states[0].name in cells
-    return {"time": time, "u": u, "y": y, "x": x if has_states else None}
+    return {"time": time, "u": u, "y": y, "x": x if has_states else None, "events": True if Ts is None else None}
 
 
-def check_times(time: Array, Ts: float, place: Place) -> None:
-    """Raise a ValueError unless time goes by the sampling time; ``place`` says where a sample stands."""
+def check_times(time: Array, Ts: float | None, place: Place) -> None:
+    """Raise a ValueError unless time goes by the sampling time; ``place`` says where a sample stands.
+
+    Without ``Ts`` it has to increase.
+    """
     with np.errstate(over="ignore"):  # of a damaged clock
         steps = np.diff(time)
     for k in np.flatnonzero(~_is_sampled(steps, Ts))[:1].tolist():
         raise wrong_step(place(k + 1), time[k], time[k + 1], Ts)
 
 
-def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError:
+def wrong_step(where: str, before: float, after: float, Ts: float | None) -> ValueError:
     """Why time may not go so from one row to the next."""
     before, after = float(before), float(after)  # of Python, which overflow without a warning
     step = f"{where}: time goes from {before:.9g} s to {after:.9g} s"
-    if after <= before:
+    if after <= before or Ts is None:
         return ValueError(f"{step}; expected increasing times, so sort the rows and drop doubles")
     found = f"{step}, a step of {after - before:.6g} s; expected the model's sampling time {Ts:.6g} s. "
     for unit, (name, seconds) in _UNITS.items():
@@ -155,15 +161,20 @@ def wrong_step(where: str, before: float, after: float, Ts: float) -> ValueError
             change = f"divide it by {1 / seconds:g}" if seconds < 1 else f"multiply it by {seconds:g}"
             stated = f'{change}, or state unit = "{unit}" in [log.time]'
             return ValueError(f"{found}The column seems to be in {name}; {stated}")
-    return ValueError(f"{found}Resample the log; a lost sample is a row with empty sensor cells")
+    return ValueError(
+        f"{found}A lost sample is a row with empty sensor cells; a log for a model in continuous time may keep its own "
+        'times: times = "events" in [log]'
+    )
 
 
-def is_sampled(before: float, after: float, Ts: float) -> bool:
-    """Whether a row follows another by one sampling time."""
+def is_sampled(before: float, after: float, Ts: float | None) -> bool:
+    """Whether a row follows another by one sampling time; without ``Ts``, by any."""
     return bool(_is_sampled(np.array(float(after) - float(before)), Ts))
 
 
-def _is_sampled(steps: Array, Ts: float) -> NDArray[np.bool_]:
+def _is_sampled(steps: Array, Ts: float | None) -> NDArray[np.bool_]:
+    if Ts is None:
+        return np.asarray(steps > 0.0)
     return np.abs(steps - Ts) <= TIME_TOLERANCE * Ts
 
 

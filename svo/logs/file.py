@@ -46,7 +46,7 @@ def write_log(path: str | Path, log: Log, columns: Columns) -> None:
     _format(path).write(path, log.to_columns(columns))
 
 
-def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
+def read_log(path: str | Path, columns: Columns, Ts: float | None) -> Log:
     """Read a log under the rules of `svo.logs.columns`.
 
     Parameters
@@ -54,8 +54,8 @@ def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
     path : path of a .csv, .parquet or .mat file
     columns : Columns
         Names of the columns, in the model's order.
-    Ts : float
-        The model's sampling time [s].
+    Ts : float or None
+        The model's sampling time [s]; None for a log that keeps its own times.
 
     Returns
     -------
@@ -74,14 +74,15 @@ def read_log(path: str | Path, columns: Columns, Ts: float) -> Log:
     return joined(list(read_portions(path, columns, Ts)))
 
 
-def read_portions(path: str | Path, columns: Columns, Ts: float, note: Note = noted) -> Iterator[Log]:
+def read_portions(path: str | Path, columns: Columns, Ts: float | None, note: Note = noted) -> Iterator[Log]:
     """A log in portions, one after the other, so that it need not be in memory as a whole; a MAT file is one portion.
 
     Arguments and errors are those of `read_log`; an error comes when its portion is asked for. ``note`` is told of what
     was read in a way that its reader should know of; by default that is a warning, `svo.logs.columns.LogNote`.
     """
     path = Path(path)
-    expect(is_finite_number(Ts) and Ts > 0, "Ts", Ts, "a positive sampling time in seconds")
+    good = Ts is None or (is_finite_number(Ts) and Ts > 0)
+    expect(good, "Ts", Ts, "a positive sampling time in seconds, or None")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; expected a log file, one of {', '.join(_FORMATS)}")
     rows = _format(path).read(path, columns, note)

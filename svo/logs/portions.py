@@ -34,7 +34,7 @@ def samples_from(first: int) -> Place:
     return lambda k: f"sample {first + k}"
 
 
-def portions_of(source: str, rows: Iterable[Rows], columns: Columns, Ts: float) -> Iterator[Log]:
+def portions_of(source: str, rows: Iterable[Rows], columns: Columns, Ts: float | None) -> Iterator[Log]:
     """A log of at least one sample for each portion of rows that has any, once its times are checked.
 
     Raises

@@ -41,6 +41,8 @@ class Told:
     widening : tuple of float or None
         As of `svo.Log`.
     notes : tuple of str
+    events : bool
+        Whether it keeps its own times.
     """
 
     source: str
@@ -49,6 +51,7 @@ class Told:
     log: str | None
     widening: tuple[float, ...] | None
     notes: tuple[str, ...]
+    events: bool = False
 
     @property
     def wider(self) -> Array | None:
@@ -104,7 +107,8 @@ class Imported:
         }
 
     def __str__(self) -> str:
-        span = f"{len(self.log)} samples of {self.Ts:g} s, 0 to {self.log.time[-1]:.9g} s"
+        each = "at times of their own" if self.told.events else f"of {self.Ts:g} s"
+        span = f"{len(self.log)} samples {each}, 0 to {self.log.time[-1]:.9g} s"
         lines = [f"{self.path}: {span}, the first one at {self.told.start}"]
         for name, unit, values in self._channels:
             ends = _range(values)
@@ -158,6 +162,7 @@ def import_log(source: str | Path, plant: MonitoredPlant, out: str | Path) -> Im
         log=None if dialect is None else dialect.stated,
         widening=None if log.widening is None else tuple(log.widening.tolist()),
         notes=reading.notes,
+        events=bool(log.events),
     )
     exact = None if told.widening is None else [value.hex() for value in told.widening]
     text = json.dumps({**asdict(told), "widening": exact}, ensure_ascii=False)

@@ -78,7 +78,7 @@ def check_measured(path: str | Path, plant: MonitoredPlant, missing: NDArray[np.
 def _read(path: str | Path, plant: MonitoredPlant) -> Log:
     dialect, imported = dialect_of(plant), imported_log(path, plant)
     if dialect is None or imported is not None:
-        log = file.read_log(path, plant.columns, plant.Ts)
+        log = file.read_log(path, plant.columns, None if imported is not None and imported.events else plant.Ts)
         return log if imported is None else replace(log, widening=imported.wider)
     return noted(read_dialect(path, plant.columns, plant.Ts, dialect), path)
 

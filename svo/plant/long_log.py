@@ -32,7 +32,8 @@ class LongLog:
     missing : (ny,) array of int
         Samples without a measurement of each sensor.
     kept : Log or None
-        The log itself where it cannot be read in portions: a `[log]` table of the plant sets it on its grid.
+        The log itself where it is not read in portions: a `[log]` table of the plant sets it on its grid, or it keeps
+        its own times.
     widening : (ny,) array or None
         As that of a `Log`.
     """
@@ -91,7 +92,7 @@ def survey_log(path: str | Path, plant: MonitoredPlant) -> LongLog:
     expect_plant(plant)
     path = Path(path)
     imported = imported_log(path, plant)
-    if dialect_of(plant) is not None and imported is None:
+    if imported.events if imported is not None else dialect_of(plant) is not None:
         log = read_log(path, plant)
         missing = np.isnan(log.y).sum(axis=0)
         return LongLog(path, plant, len(log), float(log.time[0]), float(log.time[-1]), missing, log, log.widening)

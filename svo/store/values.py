@@ -149,4 +149,3 @@ def _short(value: Any) -> str:
         return "a larger one"
     text = repr(value)
     return text if len(text) <= 40 else f"{text[:40]}..."
-

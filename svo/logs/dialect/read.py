@@ -14,6 +14,7 @@ from svo.logs.columns import noted as warn
 from svo.logs.dialect.block import SUMMER
 from svo.logs.dialect.channels import Channels, when
 from svo.logs.dialect.clocks import check_counts, check_kinds, slow_note
+from svo.logs.dialect.events import merged
 from svo.logs.dialect.grid import Placed, check_unit, grid_of, most_samples, place_input, place_output
 from svo.logs.dialect.rules import Dialect
 from svo.logs.dialect.series import Series
@@ -66,8 +67,37 @@ def read_dialect(path: str | Path, columns: Columns, Ts: float, dialect: Dialect
     path = Path(path)
     channels = Channels(path, columns, dialect)
     series = {column.name: channels.series(column) for column in channels.all}
-    found = _Placing(path, columns, Ts, channels, series).reading()
-    return replace(found, log=replace(found.log, source=path.name))
+    _check_read(path, channels, series)
+    if dialect.events:
+        log, start = merged(path, columns, Ts, channels, series)
+        widening = np.array([_rounding(channels, column) for column in columns.outputs])
+    else:
+        log, start, widening = _Placing(path, columns, Ts, channels, series).placed()
+    if any(one.block.is_local for one in series.values()):
+        channels.notes.append(
+            "times are local ones without a zone, so only their differences are known (zone in [log.time])"
+        )
+    log = replace(log, source=path.name, widening=widening if widening.any() else None)
+    return Reading(log, start, tuple(channels.notes))
+
+
+def _check_read(path: Path, channels: Channels, series: Mapping[str, Series]) -> None:
+    """Every input is there, and some channel."""
+    for name, one in series.items():
+        if channels.is_input(name) and not one.values.size:
+            rows = "" if one.block.rows else " (there are no rows behind the names)"
+            raise ValueError(f"{path}, {one.label}: no row has a reading of {name}{rows}; an input must be known")
+    if not any(one.values.size for one in series.values()):
+        raise ValueError(f"{path}: no row has a reading of {' or '.join(series)}")
+
+
+def _rounding(channels: Channels, column: Column) -> float:
+    """By what the bound of a sensor's noise grows for the resolution of its numbers."""
+    rule = channels.rule(column.name)
+    rounding = rule.resolution / 2 * abs(in_model_units(rule, column.unit)[0])
+    if rounding:
+        channels.notes.append(f"{column.name}: n grows by {rounding:.6g} {column.unit}, half of its resolution")
+    return rounding
 
 
 def noted(reading: Reading, path: str | Path) -> Log:
@@ -85,17 +115,11 @@ class _Placing:
     ) -> None:
         self._columns, self._Ts, self._channels, self._series = columns, Ts, channels, series
         self._notes = channels.notes
-        for name, one in series.items():
-            if channels.is_input(name) and not one.values.size:
-                rows = "" if one.block.rows else " (there are no rows behind the names)"
-                raise ValueError(f"{path}, {one.label}: no row has a reading of {name}{rows}; an input must be known")
-        measured = [one for one in series.values() if one.values.size]
-        if not measured:
-            raise ValueError(f"{path}: no row has a reading of {' or '.join(series)}")
-        self._anchor = measured[0]
+        self._anchor = next(one for one in series.values() if one.values.size)
         self._origin = self._anchor.stamp(0)
 
-    def reading(self) -> Reading:
+    def placed(self) -> tuple[Log, str, Array]:
+        """The log, its first sample's own time for people, and its widening."""
         anchor = self._anchor
         every = self._channels.rule(anchor.name).every
         check_unit(anchor, self._Ts, self._channels.times(anchor.name), every)
@@ -110,16 +134,11 @@ class _Placing:
         u, y = (self._stacked(group, placed, first, last) for group in (self._columns.inputs, self._columns.outputs))
         widening = np.array([self._widening(column, placed[column.name]) for column in self._columns.outputs])
         self._notes += [note for column in self._channels.all for note in self._left_out(column, placed[column.name])]
-        if anchor.block.is_local:
-            self._notes.append(
-                "times are local ones without a zone, so only their differences are known (zone in [log.time])"
-            )
-        log = Log(time - time[0], u, y, widening=widening if widening.any() else None)
         start = self._origin + round(time[0] * PICO)
         if anchor.block.is_date:  # no finer than a sample is told from another
             finest = max(round(TIME_TOLERANCE * self._Ts * PICO), 1)
             start = round(start / finest) * finest
-        return Reading(log, when(anchor, start), tuple(self._notes))
+        return Log(time - time[0], u, y), when(anchor, start), widening
 
     def _place(self, one: Series, grid: Array) -> Placed:
         place = place_input if self._channels.is_input(one.name) else place_output
@@ -210,16 +229,13 @@ class _Placing:
 
     def _widening(self, column: Column, placed: Placed) -> float:
         """By what the bound of a sensor's noise grows."""
-        rule = self._channels.rule(column.name)
-        rounding = rule.resolution / 2 * abs(in_model_units(rule, column.unit)[0])
         if placed.moved:
+            rate = self._channels.rule(column.name).rate
             self._notes.append(
                 f"{column.name}: readings are moved by up to {placed.moved:.6g} s to their samples; n grows by "
-                f"{placed.price:.6g} {column.unit}, at {rule.rate:g} {column.unit}/s"
+                f"{placed.price:.6g} {column.unit}, at {rate:g} {column.unit}/s"
             )
-        if rounding:
-            self._notes.append(f"{column.name}: n grows by {rounding:.6g} {column.unit}, half of its resolution")
-        return rounding + placed.price
+        return _rounding(self._channels, column) + placed.price
 
     def _left_out(self, column: Column, placed: Placed) -> Iterator[str]:
         if not placed.left_out:

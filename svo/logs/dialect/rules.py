@@ -154,6 +154,8 @@ class Dialect:
         What counts where readings of one time differ.
     sort : bool
         Rows may stand in any order.
+    events : bool
+        Channels keep their own times, instead of those of one grid.
     part : int, optional
         Which recording, from 1 on, of a log whose clock was started again.
     stated : str
@@ -177,6 +179,7 @@ class Dialect:
     channels: Mapping[str, Channel] = field(default_factory=dict)
     duplicates: str = "error"
     sort: bool = False
+    events: bool = False
     part: int | None = None
     stated: str = ""
 

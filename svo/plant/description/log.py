@@ -20,6 +20,7 @@ from svo.plant.description.table import Table, shown
 _LOG = (
     "encoding", "separator", "decimal", "thousands", "exponent", "header", "first_row", "names", "skip", "missing",
     "sentinels", "valid", "time", "long", "columns", "duplicates", "order", "part",
+    "times",
 )  # fmt: skip
 _TIME = ("column", "start", "step", "format", "unit", "scale", "epoch", "zone", "one_clock")
 _CHANNEL = (
@@ -30,6 +31,7 @@ ALL_KEYS = (*_LOG, *_TIME, *_CHANNEL)
 _FINEST, _LONGEST = 1e-12, 1e15  # seconds: a picosecond, thirty million years
 _NO_MARKS = tuple('"+-\r\n')
 _NUMBERS_ONLY = ("unit", "scale", "epoch")
+_GRID_ONLY = ("every", "rate")
 _OUTPUTS_ONLY = {
     "resolution": "an input is taken as exact; widen w of [model] by what it is not",
     "held": 'an input stays what it was by missing = "hold"',
@@ -59,11 +61,22 @@ def dialect_of(top: Table, columns: Columns) -> Dialect | None:
         channels=_channels(table.table("columns"), columns, long),
         duplicates=table.text("duplicates", "error", ("error", "first", "last", "mean")),
         sort=table.text("order", "", ("sort",)) == "sort" if "order" in table else False,
+        events="times" in table and table.text("times", choices=("events",)) == "events",
         part=_line(table, "part"),
         stated=json.dumps(table.content, default=str, ensure_ascii=False),
     )
     _check_rows(table, dialect)
+    if dialect.events:
+        _check_own_times(table.table("columns"))
     return dialect
+
+
+def _check_own_times(channels: Table) -> None:
+    """No channel states what is about a grid."""
+    for name in channels.content:
+        for key in _GRID_ONLY:
+            if key in channels.table(name):
+                raise channels.table(name).error(key, 'is about a grid; drop it, or times = "events" of [log]')
 
 
 def _marks(table: Table) -> dict[str, str]:

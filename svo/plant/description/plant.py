@@ -19,6 +19,7 @@ from svo.logs.dialect.rules import Dialect
 from svo.logs.log import Log
 from svo.logs.names import Column, Columns
 from svo.models import UncertainModel
+from svo.models.intervals import has_own_intervals
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.observer import WindowObserver
 from svo.plant import no_schedule
@@ -160,6 +161,9 @@ def read_description(path: str | Path) -> DescribedPlant:
         faults = faults_of(top, model, names)
     initial = box_of(top.table("initial"), model.n_states)
     _check_architecture(top, faults)
+    dialect = dialect_of(top, columns)
+    if dialect is not None and dialect.events:
+        _check_takes_events(top, model, faults)
     return DescribedPlant(
         name=path.name,
         title=top.text("title", path.stem),
@@ -172,8 +176,20 @@ def read_description(path: str | Path) -> DescribedPlant:
         bank_options=_bank_options(top),
         files=_files(path, top.table("model")),
         interval=interval_settings(top, columns),
-        dialect=dialect_of(top, columns),
+        dialect=dialect,
     )
+
+
+def _check_takes_events(top: Table, model: Model, faults: Mapping[str, FaultModel]) -> None:
+    """Refuse times of their own for what takes only those of the sampling time."""
+    log = top.table("log")
+    if "interval_detector" in top:
+        raise log.error("times", 'is "events", and [interval_detector] is of samples of Ts; drop one of both')
+    if not all(has_own_intervals(one) for one in (model, *(fault.model for fault in faults.values()))):
+        raise log.error(
+            "times", 'is "events", and a model is in discrete time, which has no other steps than Ts; state continuous '
+            "= true in [model] with arrays of dx/dt"
+        )  # fmt: skip
 
 
 def _wider(model: Model, widening: Array) -> Model:
