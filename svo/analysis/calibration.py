@@ -18,11 +18,14 @@ from polytopes.signatures import options_by_name
 from svo.analysis.elastic_bounds import Bound, bounds_of
 from svo.analysis.elastic_program import ElasticProgram, Explained
 from svo.analysis.explanation import NEGLIGIBLE, explain
+from svo.analysis.nonlinear_calibration import WidenedPlant, half_widths
 from svo.analysis.trajectory import Trajectory
 from svo.checks import Array, bounded_box, expect, expect_shape, is_count
 from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel, expect_model
+from svo.models.nonlinear import NonlinearModel
 
+_MOST_RUNS = 50
 _ROOM = 1e-6  # relative: of bounds that are wide enough while the first sample of another is looked for
 
 
@@ -59,23 +62,23 @@ class Calibration(Shown):
         The largest relative one first; empty if the model explains the log as it is.
     chosen : tuple of str
         Names of all bounds that could have been widened.
-    model : UncertainModel
-        The model with these bounds widened. It has a trajectory through every sample of the log: no observer of it
-        falsifies the log.
+    model : UncertainModel or NonlinearModel
+        The model with these bounds widened. A linear one has a trajectory through every sample of the log: no observer
+        of it falsifies the log. Of a nonlinear one a `WindowObserver` with the default options does not, which was run.
     smallest : bool
         Whether no widening that is cheaper, by more than the solver's tolerance, explains the log. It is not claimed
-        if the log was longer than one program, or if a Delta multiplies a state or a disturbance.
+        if the log was longer than one program, if a Delta multiplies a state or a disturbance, or of a nonlinear model.
     """
 
     widenings: tuple[Widening, ...]
     chosen: tuple[str, ...]
-    model: UncertainModel
+    model: UncertainModel | NonlinearModel
     smallest: bool
 
 
 @options_by_name
 def calibrate(
-    model: UncertainModel,
+    model: UncertainModel | NonlinearModel,
     log: Log,
     initial: HPolytope,
     *,
@@ -86,14 +89,15 @@ def calibrate(
 
     Parameters
     ----------
-    model : UncertainModel
+    model : UncertainModel or NonlinearModel
     log : Log
         Fault-free data, with the schedule of each sample if the model has one; NaN in y = missing.
     initial : HPolytope
         Bounded set of the states at the first sample.
     bounds : sequence of str
-        What may be widened: "noise", "disturbances" and "deltas" for all of a kind, or the name of a single bound
-        ("noise alpha"). Names come from ``model.names``, indices stand in for missing ones.
+        What may be widened: "noise", "disturbances" and "deltas", or of a nonlinear model "parameters", for all of a
+        kind, or the name of a single bound ("noise alpha"). Names come from ``model.names``, indices stand in for
+        missing ones.
     window : int
         Samples >= 2 in one program. A longer log is explained piece by piece: every next program goes on from the
         middle of the trajectory that the last one found. The pieces make one trajectory, so what is found does
@@ -112,6 +116,10 @@ def calibrate(
     solver. Readings are allowed 1e-9 (|y| + n) of rounding, as observers allow. Where floats cannot
     hold a trajectory in sets without an interior, the window observer of full information is run on the log instead.
 
+    A nonlinear model is calibrated on the linear models that a `WindowObserver` makes of it, remainders included, up to
+    the sample that falsifies it; with the bounds that these need it is run again, until nothing is falsified. That is
+    sufficient: other bounds linearise the plant elsewhere, so no smallest widening is claimed.
+
     Raises
     ------
     ValueError, TypeError
@@ -122,6 +130,8 @@ def calibrate(
     """
     expect(is_count(window, 2), "window", window, "a number of samples >= 2")
     _check_log(model, log)
+    if isinstance(model, NonlinearModel):
+        return _until_consistent(model, log, initial, bounds, window)
     form = NormalForm.at(model, *bounded_box("initial", initial, model.n_states))
     chosen = bounds_of(form, bounds)
     amounts = np.zeros(len(chosen))
@@ -151,6 +161,33 @@ def calibrate(
         model=explanation.model,
         smallest=len(pieces) == 1 and program.is_exact,
     )
+
+
+def _until_consistent(
+    model: NonlinearModel, log: Log, initial: HPolytope, bounds: Sequence[str], window: int
+) -> Calibration:
+    """The linear models of each run give the bounds of the next one, until nothing is falsified."""
+    plant, first, half = WidenedPlant.of(model, bounds), dict[str, int](), half_widths(model)
+    for _ in range(_MOST_RUNS):
+        part = plant.falsified_part(log, initial)
+        if part is None:
+            break
+        try:
+            found = calibrate(*part, initial, bounds=plant.linear_names, window=window)
+        except ValueError as error:
+            raise ValueError(plant.told(str(error))) from None
+        plant = plant.wider({w.bound: w.amount for w in found.widenings})
+        samples = {w.bound: w.sample for w in found.widenings}
+        names = zip(plant.chosen, plant.linear_names, strict=True)
+        first = {name: samples[own] for name, own in names if own in samples} | first
+    else:
+        raise RuntimeError(f"after {_MOST_RUNS} widenings the log is still falsified; let bounds contain more")
+    widenings = [
+        Widening(name, amount, amount / half[name] if half[name] else np.inf, first[name])
+        for name, amount in plant.amounts.items()
+    ]
+    widest = tuple(sorted(widenings, key=lambda w: -w.relative))
+    return Calibration(widest, plant.chosen, plant.model, smallest=not widest)
 
 
 @dataclass(frozen=True)
@@ -203,8 +240,9 @@ def _no_explanation(chosen: Sequence[Bound], first: int, count: int, is_exact: b
     return f"no widening of {names} that explains {which} was found; let bounds contain 'noise'"
 
 
-def _check_log(model: UncertainModel, log: Log) -> None:
-    expect_model("model", model)
+def _check_log(model: UncertainModel | NonlinearModel, log: Log) -> None:
+    if not isinstance(model, NonlinearModel):
+        expect_model("model", model)
     expect_log(log)
     if log.events:
         raise ValueError("the log keeps its own times (Log.events); calibrate takes samples of the model's Ts")

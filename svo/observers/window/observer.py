@@ -20,7 +20,7 @@ from svo.logs.drive import advance_to
 from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel
 from svo.models.intervals import check_splits, transition_rows
-from svo.models.nonlinear import NonlinearModel, Span, Undecided
+from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
 from svo.models.state_range import within
 from svo.observers.answers import VerdictName
 from svo.observers.base import Observer, Seen, Step
@@ -137,6 +137,12 @@ class WindowObserver(Observer):
     def free_since(self) -> int | None:
         """Sample from which on the readings alone bound the state, if the set last started again from them."""
         return self._window.origin if self._window.free else None
+
+    @property
+    def linearised(self) -> tuple[Linearisation | None, Linearisation | None]:
+        """Of a nonlinear model: the linear models of the sample before the newest one, with the transition from it,
+        and of the newest one, which has none yet; None before there are such samples."""
+        return (None, None) if self._plant is None else (self._plant.before, self._plant.now)
 
     @property
     def stopped(self) -> int:

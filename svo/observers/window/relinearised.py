@@ -37,6 +37,8 @@ class Relinearised:
         Known of the newest state besides what the window knows.
     reason : str or None
         Why the newest sample was not linearised.
+    now, before : Linearisation or None
+        Of the newest sample, which has no transition yet, and of the one before it.
     dt : float or None
         Seconds that the next transition is to take; None = the model's ``Ts``.
     """
@@ -44,7 +46,8 @@ class Relinearised:
     def __init__(self, model: NonlinearModel) -> None:
         self.model, self.reason, self.dt = model, None, None
         self.start_from(Span(model.start_range.lower, model.start_range.upper))
-        self._now: Linearisation | None = None
+        self.now: Linearisation | None = None
+        self.before: Linearisation | None = None
 
     reason: str | None
     dt: float | None
@@ -67,10 +70,11 @@ class Relinearised:
         lower, upper = np.maximum(known.lower, self.box.lower), np.minimum(known.upper, self.box.upper)
         if not (lower <= upper).all():  # only the window's programs raise an alarm
             lower, upper = known
-        assert self._now is not None
+        assert self.now is not None
         found = self.model.transition(lower, upper, u, dt=dt)
         self.box = found.box
-        return self._now.moved(found)
+        self.before = self.now.moved(found)
+        return self.before
 
     def give_up(self, why: Undecided, sample: int) -> Span:
         """The box from which the set starts again where a transition to a sample is not enclosed."""
@@ -89,8 +93,8 @@ class Relinearised:
             nothing = [np.zeros((len(y), size)) for size in (model.n_states, len(model.flow.varying))]
             output = LinearOutput(nothing[0], np.zeros(len(y)), nothing[1], np.zeros(len(y)))
             y = np.full(len(y), np.nan)
-        self._now = Linearisation.before(output, model.noise)
-        return self._now, y
+        self.now = Linearisation.before(output, model.noise)
+        return self.now, y
 
     def _cut(self, y: Array, u: Array) -> LinearOutput:
         """The output over the box, which it cuts; again over what is left while its remainder blurs the readings."""
@@ -111,7 +115,7 @@ class Relinearised:
 
     def state(self) -> dict[str, NDArray[Any]]:
         """What the next samples depend on, as named arrays."""
-        now = {} if self._now is None else {f"plant.{name}": getattr(self._now, name) for name in _MEASURED}
+        now = {} if self.now is None else {f"plant.{name}": getattr(self.now, name) for name in _MEASURED}
         return {"plant.box": np.array(self.box), "plant.reason": np.array(self.reason or "")} | now
 
     def resume(self, state: Mapping[str, NDArray[Any]], has_samples: bool) -> None:
@@ -121,9 +125,9 @@ class Relinearised:
         box = Span(*numbers(state, "plant.box", 2, n))
         if not (box.lower <= box.upper).all():
             raise ValueError(f"plant.box is from {box.lower} to {box.upper}; expected a box")
-        self.box, self._now, self.reason = box, None, str(state["plant.reason"]) or None
+        self.box, self.now, self.reason = box, None, str(state["plant.reason"]) or None
         if has_samples:
             shapes = zip(_MEASURED, ((ny, n), (ny,), (ny, columns), (ny,)), strict=True)
-            self._now = Linearisation.measured(*(numbers(state, f"plant.{name}", *shape) for name, shape in shapes))
-            if (self._now.n < model.noise).any():
+            self.now = Linearisation.measured(*(numbers(state, f"plant.{name}", *shape) for name, shape in shapes))
+            if (self.now.n < model.noise).any():
                 raise ValueError("plant.n is below the noise of the model")
