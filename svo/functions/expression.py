@@ -72,6 +72,13 @@ class Recorder:
                 return root
         return self.put(Op.MUL, a, b)
 
+    def quotient(self, a: Any, b: Any) -> Expression:
+        """a / b; a product with 1 / b where one of them is a constant."""
+        a, b = self.constant(a), self.constant(b)
+        if Op.CONSTANT in (self.slots[a.slot][0], self.slots[b.slot][0]):
+            return self.product(a, self.put(Op.INV, b))
+        return self.put(Op.DIV, a, b)
+
     def enclosed(self, values: Interval) -> Expression:
         """A constant that an interval contains."""
         return self._slot((Op.CONSTANT, (), (values[0] + 0.0, values[1] + 0.0)))
@@ -115,11 +122,12 @@ class Recorder:
         """The slots that a product comes from; of one with very many, those products that are left."""
         factors = [slot]
         while len(factors) < _MOST_FACTORS:
-            product = next((i for i in factors if self.slots[i][0] is Op.MUL), None)
+            product = next((i for i in factors if self.slots[i][0] in (Op.MUL, Op.DIV)), None)
             if product is None:
                 break
             factors.remove(product)
-            factors += self.slots[product][1]
+            op, (first, second), _ = self.slots[product]
+            factors += [first, second if op is Op.MUL else self.put(Op.INV, Expression(self, second)).slot]
         return factors
 
     def _without(self, slot: int, factor: int) -> list[int]:
@@ -158,10 +166,10 @@ class Expression:
         return _spread(other, lambda o: self.recorder.product(o, self))
 
     def __truediv__(self, other: Any) -> Any:
-        return _spread(other, lambda o: self.recorder.product(self, self.recorder.put(Op.INV, o)))
+        return _spread(other, lambda o: self.recorder.quotient(self, o))
 
     def __rtruediv__(self, other: Any) -> Any:
-        return _spread(other, lambda o: self.recorder.product(o, self.recorder.put(Op.INV, self)))
+        return _spread(other, lambda o: self.recorder.quotient(o, self))
 
     def __neg__(self) -> Expression:
         return self.recorder.put(Op.NEG, self)

@@ -148,6 +148,19 @@ class Box(NamedTuple):
         size = (len(p) + 4.0) * self.size(a) * self.size(b)
         return self.rounded(a.k * b.k, g, (low, high), mul(a.range, b.range), size)
 
+    def quotient(self, a: Form, b: Form) -> Form:
+        """a / b = q + (a - q b) / b: with q that of the centres, what a and b have in common leaves the numerator."""
+        over = self.applied(Op.INV, b)
+        plain = self.product(a, over)
+        q = a.k / b.k if b.k else math.inf
+        if not abs(q) < 1e300:
+            return plain
+        point = q, q
+        left = self.difference(a, self.sloped(b, q, (0.0, 0.0), mul(point, b.range)))
+        shared = self.total(self.constant(point), self.product(left, over))
+        best, other = sorted((plain, shared), key=lambda form: form.rest[1] - form.rest[0])
+        return self._within(best, other.range)
+
     def maximum(self, a: Form, b: Form) -> Form:
         """The larger one of two: b + max(a - b, 0)."""
         gap = self.difference(a, b)
@@ -241,5 +254,5 @@ def _ends(slope: float, rest: Interval) -> Interval:
 
 _RULES: Mapping[Op, Callable[..., Form]] = {
     Op.NEG: Box.opposite, Op.ADD: Box.total, Op.SUB: Box.difference, Op.MUL: Box.product, Op.MAX: Box.maximum,
-    Op.SELECT: Box.chosen, Op.ATAN2: Box.angle,
+    Op.SELECT: Box.chosen, Op.ATAN2: Box.angle, Op.DIV: Box.quotient,
 }  # fmt: skip

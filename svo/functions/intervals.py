@@ -90,6 +90,11 @@ def inv(a: Interval) -> Interval:
     return down(1.0 / a[1]), up(1.0 / a[0])
 
 
+def div(a: Interval, b: Interval) -> Interval:
+    """All quotients."""
+    return mul(a, inv(b))
+
+
 def sqrt(a: Interval) -> Interval:
     """All roots."""
     if a[0] < 0.0:
@@ -196,7 +201,7 @@ def ball_below(value: arb) -> float:
 OPERATIONS: Mapping[Op, Callable[..., Interval]] = {
     Op.NEG: neg, Op.ADD: add, Op.SUB: sub, Op.MUL: mul, Op.SQR: sqr, Op.INV: inv, Op.SQRT: sqrt, Op.EXP: exp,
     Op.LOG: log, Op.SIN: sin, Op.COS: cos, Op.TANH: tanh, Op.ABS: absolute, Op.SIGN: sign, Op.SROOT: sroot,
-    Op.MAX: maximum, Op.ATAN2: atan2, Op.SELECT: select,
+    Op.MAX: maximum, Op.ATAN2: atan2, Op.SELECT: select, Op.DIV: div,
 }  # fmt: skip
 
 

@@ -28,6 +28,7 @@ class Op(IntEnum):
     MAX = 17
     ATAN2 = 18
     SELECT = 19  # the second operand where the first is below zero, else the third
+    DIV = 20
 
     @property
     def operands(self) -> int:
@@ -37,9 +38,11 @@ class Op(IntEnum):
     @property
     def word(self) -> str:
         """What a message calls it."""
-        return {Op.INV: "1 / (...)", Op.MUL: "product", Op.SQR: "square"}.get(self, self.name.lower())
+        words = {Op.INV: "1 / (...)", Op.MUL: "product", Op.SQR: "square", Op.DIV: "quotient"}
+        return words.get(self, self.name.lower())
 
 
 _OPERANDS = {
     Op.VARIABLE: 0, Op.CONSTANT: 0, Op.ADD: 2, Op.SUB: 2, Op.MUL: 2, Op.MAX: 2, Op.ATAN2: 2, Op.SELECT: 3,
+    Op.DIV: 2,
 }  # fmt: skip

@@ -155,7 +155,8 @@ class Tape(Value):
         g[:, own] = np.array([row.g for row in rows]).reshape(len(rows), len(own))
         ends = np.array([[*row.rest, *row.range] for row in rows]).reshape(len(rows), 4).T
         centre = 0.5 * lower[:free] + 0.5 * upper[:free]
-        return Forms(centre, np.array([row.k for row in rows], dtype=float), g, *ends.copy())
+        reach = np.maximum(upper[:free] - centre, centre - lower[:free]) * (1.0 + 2.0**-50)
+        return Forms(centre, reach, np.array([row.k for row in rows], dtype=float), g, *ends.copy())
 
     def check(self, lower: Array, upper: Array) -> None:
         """Raise Unenclosed if a row has no bounded range, whatever the coordinates are whose ends are NaN."""
@@ -206,12 +207,14 @@ class Forms:
 
     Attributes
     ----------
-    centre : (free,) array
+    centre, reach : (free,) arrays
+        Of the box: its centre, and bounds of abs(z - centre).
     k, low, high, lower, upper : (m,) arrays
     g : (m, free) array
     """
 
     centre: Array
+    reach: Array
     k: Array
     g: Array
     low: Array
@@ -225,5 +228,5 @@ _IN_FLOATS: dict[Op, Callable[..., Any]] = {
     Op.INV: lambda s: np.divide(1.0, s), Op.SQRT: np.sqrt, Op.EXP: np.exp, Op.LOG: np.log, Op.SIN: np.sin,
     Op.COS: np.cos, Op.TANH: np.tanh, Op.ABS: np.abs, Op.SIGN: np.sign,
     Op.SROOT: lambda s: np.sign(s) * np.sqrt(np.abs(s)), Op.MAX: np.maximum, Op.ATAN2: np.arctan2,
-    Op.SELECT: lambda t, a, b: np.where(t < 0.0, a, b),
+    Op.SELECT: lambda t, a, b: np.where(t < 0.0, a, b), Op.DIV: np.divide,
 }  # fmt: skip

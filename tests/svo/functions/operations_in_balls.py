@@ -28,7 +28,7 @@ IN_BALLS: dict[Op, Callable[..., arb]] = {
     Op.SQR: lambda s: s * s, Op.INV: lambda s: 1 / s, Op.SQRT: arb.sqrt, Op.EXP: arb.exp, Op.LOG: arb.log,
     Op.SIN: arb.sin, Op.COS: arb.cos, Op.TANH: arb.tanh, Op.ABS: abs, Op.SIGN: arb.sgn, Op.SROOT: _sroot,
     Op.MAX: lambda s, t: s if s >= t else t, Op.ATAN2: lambda y, x: arb.atan2(y, x),
-    Op.SELECT: lambda t, s, r: s if t < 0 else r,
+    Op.SELECT: lambda t, s, r: s if t < 0 else r, Op.DIV: lambda s, t: s / t,
 }  # fmt: skip
 
 

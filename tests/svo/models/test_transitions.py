@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from svo.checks import Array
-from svo.models.nonlinear import NonlinearModel, Undecided
+from svo.models.nonlinear import NonlinearModel, Span, Undecided
 from svo.models.nonlinear.simulation import integrated
 from tests.svo.models.nonlinear_plants import CASES, Case, cstr, pendulum, three_tanks
 
@@ -139,6 +139,42 @@ def test_units_that_are_powers_of_two_scale_a_transition() -> None:
     assert two.R / unit == pytest.approx(one.R, rel=1e-9)
     assert two.a / unit == pytest.approx(one.a, rel=1e-12)
     assert np.abs(two.A - one.A).max() < 1e-12
+
+
+def test_a_state_that_is_pulled_back_is_enclosed_by_its_own_ends() -> None:
+    """A stiff reaction: nothing leaves [0, 1], though |f| is up to 31 there."""
+    model = NonlinearModel(
+        lambda x: [60.0 * (0.5 - x[0]) - x[0] ** 3, x[0] - 0.1 * x[1]], lambda x: x, states=["a", "b"], Ts=0.05,
+        largest=([-9, -9], [9, 9]),
+    )  # fmt: skip
+    start, h = Span(np.array([0.0, 2.0]), np.array([1.0, 3.0])), model.Ts / 8
+    box, _ = model.flow.enclosure(start, np.zeros(0), h)
+    assert box.lower[0] == pytest.approx(0.0, abs=1e-9)
+    assert box.upper[0] == pytest.approx(1.0, abs=1e-9)
+    x = np.array([[a, b] for a in (0.0, 0.4, 1.0) for b in (2.0, 3.0)])
+    for _ in range(10):
+        x = integrated(model.flow, x, np.zeros((6, 0)), np.zeros(0), h / 10, 10)
+        assert ((x >= box.lower) & (x <= box.upper)).all()
+
+
+def test_a_quotient_keeps_what_its_parts_have_in_common() -> None:
+    """Monod's growth, whose numerator and denominator rise together; as a product with 1 / (K + s) it is far wider."""
+
+    def model(growth):
+        return NonlinearModel(
+            lambda x, p: [growth(x[0], p[0])], lambda x: x, states=["s"], parameters={"mu": (0.48, 0.52)},
+            Ts=1.0, largest=([0], [9]), continuous=False,
+        )  # fmt: skip
+
+    one, other = (model(g) for g in (lambda s, mu: mu * s / (0.2 + s), lambda s, mu: mu * s * (1.0 / (0.2 + s))))
+    for low, high in (0.2, 0.4), (0.1, 1.0), (0.0, 8.0):
+        ours, product = one.transition([low], [high]), other.transition([low], [high])
+        s = np.linspace(low, high, 50)
+        for mu in (0.48, 0.5, 0.52):
+            rest = mu * s / (0.2 + s) - s * ours.A[0, 0] - ours.a[0] - mu * ours.E[0, 0]
+            assert (np.abs(rest) <= ours.R[0] + 1e-15).all()
+        assert ours.R[0] < 0.75 * product.R[0], (low, high)
+        assert ours.box.width[0] < product.box.width[0]
 
 
 def test_a_face_of_the_physical_range_may_be_touched() -> None:
