@@ -3,8 +3,8 @@
 The cone ``{y : G y <= 0}`` is the sum of its lines (the null space of G) and a pointed cone.  The pointed cone begins
 with a simplex, as many independent rows as it has dimensions, and takes the other rows one by one: the rays beyond a
 row go, and each ray inside is joined with each adjacent ray beyond where the edge between them meets the row.  Two rays
-are adjacent if no third one lies on all rows that both lie on (Fukuda and Prodon 1996).  Nothing is rounded: machine
-integers as long as no product can overflow, Python's own beyond.
+are adjacent if no third one lies on all rows that both lie on (Fukuda and Prodon 1996).  Nothing is rounded: the
+compiled core does it in machine integers; where a product could overflow, it is done again in Python's own.
 """
 
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from flint import fmpq_mat, fmpz_mat
 from numpy.typing import NDArray
 
+from polytopes import kernel
 from polytopes.errors import UndecidedError
 
 Integers = NDArray[Any]  # int64, or object: Python integers of any size
@@ -75,25 +76,37 @@ def primitive(rows: Integers) -> Integers:
 
 
 def _pointed_rays(G: Integers, max_rays: int) -> Integers:
-    """Extreme rays of a pointed cone ``{y : G y <= 0}``: G has full column rank.
+    """Extreme rays of a pointed cone ``{y : G y <= 0}``: G has full column rank."""
+    G = G[_good_order(G)]
+    start = _independent(G)
+    rays = _simplex(G[start])
+    found: Integers | None = None
+    if G.dtype != object and rays.dtype != object:
+        found = kernel.double_description(G, np.array(start), rays, max_rays)
+    if found is None:
+        found = _large_rays(G.astype(object), start, rays.astype(object), max_rays)
+    if len(found) > max_rays:
+        raise UndecidedError(
+            f"the double description of {len(G)} rows in {G.shape[1]} coordinates passes its limit of {max_rays} rays."
+        )
+    return found
+
+
+def _large_rays(G: Integers, start: list[int], rays: Integers, max_rays: int) -> Integers:
+    """The same in integers of any size, from the rays of the rows `start`; more than the limit where it is passed.
 
     A table holds each ray and, behind it, its products with all rows of G, so that a new ray costs one combination.
     """
     m, d = G.shape
-    G = G[_good_order(G)]
-    start = _independent(G)
-    rays = _simplex(G[start])
-    table = np.hstack([rays, _product(rays, G)])  # of objects, if one of them is
+    table = np.hstack([rays, rays @ G.T])
     on = np.zeros((len(rays), (m + 63) // 64), dtype=np.uint64)  # a bit for each row taken that the ray lies on
     for i in start:
         _mark(on, i, table[:, d + i] == 0)
     for i in sorted(set(range(m)) - set(start)):
         table, on = _cut(table, on, i, d)
         if len(table) > max_rays:
-            raise UndecidedError(
-                f"the double description of {m} rows in {d} coordinates passes its limit of {max_rays} rays."
-            )
-    return table[:, :d]
+            break
+    return primitive(table[:, :d])
 
 
 def _good_order(G: Integers) -> list[int]:
@@ -121,18 +134,6 @@ def _simplex(B: Integers) -> Integers:
     return primitive(columns if denominator > 0 else -columns)
 
 
-def _product(rays: Integers, G: Integers) -> Integers:
-    """``rays G'`` without overflow."""
-    if rays.dtype == object or G.dtype == object or G.shape[1] * _largest(rays) * _largest(G) >= _MACHINE:
-        rays, G = rays.astype(object), G.astype(object)
-    product: Integers = rays @ G.T
-    return product
-
-
-def _largest(table: Integers) -> int:
-    return int(np.abs(table).max(initial=0))
-
-
 def _mark(on: Words, i: int, which: NDArray[np.bool_]) -> None:
     on[which, i // 64] |= np.uint64(1 << (i % 64))
 
@@ -155,8 +156,6 @@ def _cut(table: Integers, on: Words, i: int, d: int) -> tuple[Integers, Words]:
 def _combined(table: Integers, first: NDArray[np.int64], second: NDArray[np.int64], column: int, d: int) -> Integers:
     """Where the edges between rays beyond and rays inside meet a row: primitive rays with their products."""
     above, below = table[first, column], -table[second, column]
-    if table.dtype != object and 2 * _largest(table) * max(_largest(above), _largest(below)) >= _MACHINE:
-        table, above, below = table.astype(object), above.astype(object), below.astype(object)
     fresh = table[first] * below[:, None] + table[second] * above[:, None]
     if len(fresh):
         fresh //= np.gcd.reduce(fresh[:, :d], axis=1)[:, None]

@@ -7,7 +7,7 @@ the end, so they are taken only where floats cannot decide: flat, thin and unbou
 import numpy as np
 
 from polytopes.errors import UndecidedError
-from polytopes.integers import Floats, integer_rows, short, short_vector
+from polytopes.integers import Floats, integer_rows, maybe_short, short
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, generators_of
 
@@ -39,7 +39,7 @@ def few_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Program)
     """The same, if there are at most 200; without a program for a set that is not flat or thin."""
     if A.shape[1] > _COORDINATES or b.size + d.size > _LONG_ROWS:
         return None
-    plain = len(A) > 0 and short_vector([*A[0].tolist(), float(b[0])])  # as a rule, all are if the first is
+    plain = maybe_short(A, b)
     if not plain and program.fat and not program.flat.pivots:
         return None
     rows = integer_form(A, b, C, d)

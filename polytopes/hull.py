@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from polytopes.checks import Floats
 from polytopes.frame import Oracle, inverted, principal_axes, unit_frame
+from polytopes.general_position import simplicial_facets
 from polytopes.qhull import point_hull
 from polytopes.redundancy import irredundant
 
@@ -109,7 +110,7 @@ class _Facets:
     """Facets of the hull of full-dimensional points (k, n) of widths about one, as Qhull found them.
 
     `rows` are distinct outward unit normals with minus the offsets, `simplices` (f, n) numbers of points, each with its
-    row in `number`, and `corners` the numbers of the points that are vertices.
+    row in `number`, and `corners` the numbers of the points that are vertices; `proven`: no two rows are one facet.
     """
 
     points: Floats
@@ -117,6 +118,7 @@ class _Facets:
     simplices: Indices
     number: Indices
     corners: Indices
+    proven: bool = False
 
     def normals(self) -> Floats:
         """The rows' normals, without those that no facet has."""
@@ -131,10 +133,10 @@ class _Facets:
         A half-space that holds all points and touches n of them that do not lie near a smaller flat is a facet; no
         other row is the same facet if none is nearly equal.
         """
+        if self.proven or self.rows.shape[1] == 2:
+            return True
         from scipy.spatial import cKDTree
 
-        if self.rows.shape[1] == 2:
-            return True
         normals, offsets = self.rows[:, :-1], self.rows[:, -1]
         beyond = (self.points[self.corners] @ normals.T + offsets).max()
         corners = self.points[self.simplices]
@@ -152,6 +154,9 @@ def _facets(points: Floats) -> _Facets:
         ends = np.array([[points.argmax()], [points.argmin()]])
         rows = np.array([[1.0, -points.max()], [-1.0, points.min()]])
         return _Facets(points, rows, ends, np.arange(2), ends[:, 0])
+    proven = simplicial_facets(points)
+    if proven is not None:
+        return _Facets(points, *proven, np.arange(len(proven[0])), np.unique(proven[1]), True)
     equations, simplices, corners = point_hull(points)
     rows, number = np.unique(equations, axis=0, return_inverse=True)
     return _Facets(points, rows, simplices, number.ravel(), corners)

@@ -59,6 +59,11 @@ def short_vector(values: list[float]) -> bool:
     return max(whole) < SHORT * max(gcd(*whole), 1)
 
 
+def maybe_short(rows: Floats, rhs: Floats) -> bool:
+    """Whether the first row is short: as a rule, all are then."""
+    return len(rows) > 0 and short_vector([*rows[0].tolist(), float(rhs[0])])
+
+
 def is_short(*tables: Floats) -> bool:
     """Whether the rows ``A x <= b`` of tables A, b, C, d, ... are short."""
     pairs = zip(tables[::2], tables[1::2], strict=True)

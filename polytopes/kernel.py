@@ -19,6 +19,9 @@ Indices = NDArray[np.int64]
 OPTIMAL, STOPPED, UNBOUNDED, AMBIGUOUS, LIMIT = range(5)
 FINISHED, TOO_MANY, OPEN, PAUSED, _NO_ROOM = range(5)
 
+_UNPROVEN = -1
+_OVERFLOW, _MORE_RAYS, _MORE_ROOM = -1, -2, -3  # why a double description ends
+_RAYS = 500  # of a cone, for which there is room from the start
 _ROOM = 1000  # rows of an elimination for which there is room from the start
 
 
@@ -37,6 +40,14 @@ _irredundant = function("fdi_irredundant", *[Integer] * 2, *[Given] * 3, *[Entri
 _irredundant_room = _room("irredundant", 2)
 _eliminate = function("fdi_eliminate", *[Integer] * 3, *[Entries] * 10, returns=Integer)
 _eliminate_room = _room("eliminate", 2)
+_cone_rays = function(
+    "fdi_cone_rays", *[Integer] * 2, *[Given] * 2, *[Integer] * 2, *[Entries] * 3, Address, returns=Integer
+)
+_cone_rays_room = _room("cone_rays", 3)
+_double_description = function(
+    "fdi_double_description", *[Integer] * 2, *[Given] * 3, *[Integer] * 2, Entries, Address, returns=Integer
+)
+_double_description_room = _room("double_description", 3)
 _exponents = function("fdi_exponents", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, Address)
 _exponents_room = _room("exponents", 2)
 _scaled = function("fdi_scaled", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, Address, returns=Integer)
@@ -214,6 +225,62 @@ def eliminate(
     rows, dim, many, _, steps, _, formed = progress.tolist()
     rest = table[: rows * (dim + 1)].reshape(rows, dim + 1)
     return rest, left[:dim], columns[:many], inner[:dim], flags[1, :rows], trace[:steps], formed, state
+
+
+def cone_rays(GT: Floats, inner: Floats, bounded: bool, most_rays: int) -> tuple[Floats, Indices, float] | None:
+    """Extreme rays of a pointed cone ``{y : G y <= 0}`` in general position, proven to be all; None without a proof.
+
+    Parameters
+    ----------
+    GT : array (d, m)
+        Rows of length about one, transposed.
+    inner : array (d,)
+        A point where all rows are negative, up to rounding.
+    bounded : bool
+        Whether the last row is ``-y_(d-1) <= 0``: no proof then if a ray lies on it.
+    most_rays : int
+
+    Returns
+    -------
+    rays, active, slack
+        Arrays (k, d), with ``y_(d-1) = 1`` if bounded, and (k, d - 1): the rows that each lies on; and the least slack
+        of a row at a ray that does not lie on it.
+    """
+    (d, m), room, slack = GT.shape, min(_RAYS, most_rays), np.empty(1)
+    while True:
+        rays, active = np.empty((room, d)), np.empty((room, d - 1), np.int64)
+        block = scratch(_cone_rays_room(d, m, room))
+        k = _cone_rays(d, m, GT, inner, bounded, room, rays, active, slack, block)
+        if k >= 0:
+            return rays[:k], active[:k], slack.item()
+        if k == _UNPROVEN or room >= most_rays:
+            return None
+        room = min(4 * room, most_rays)
+
+
+def double_description(rows: Indices, start: Indices, simplex: Indices, most_rays: int) -> Indices | None:
+    """Extreme rays (k, d) of a pointed cone ``{y : rows y <= 0}``, primitive; None if int64 could overflow.
+
+    Parameters
+    ----------
+    rows : integers (m, d)
+        In the order in which they are taken.
+    start : integers (d,)
+        Numbers of independent rows.
+    simplex : integers (d, d)
+        The rays of these rows: ray k lies on all but row k.
+    most_rays : int
+        Beyond it, at any step, the method ends with one more.
+    """
+    (m, d), room = rows.shape, _RAYS
+    while True:
+        rays, block = np.empty((room, d), np.int64), scratch(_double_description_room(d, m, room))
+        k = _double_description(d, m, rows, start, simplex, most_rays, room, rays, block)
+        if k == _OVERFLOW:
+            return None
+        if k != _MORE_ROOM:
+            return rays[: most_rays + 1 if k == _MORE_RAYS else k]
+        room *= 4
 
 
 def exponents(rows: Floats, rhs: Floats) -> tuple[Indices, Indices]:

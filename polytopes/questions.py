@@ -221,8 +221,10 @@ class Questions(Rows):
         """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
 
         In integers where the rows are short, or the set is flat or thin (and its vertices not too many), each rounded
-        to the nearest floats.  Else Qhull on the dual of the minimal rows, then each vertex from its rows again;
-        corners closer than 1e-9 of the size are one.  The number of vertices, and the cost, grow as m^(n/2).
+        to the nearest floats.  Else along the edges from vertex to vertex, with a proof that all are found, where n
+        rows meet in each and no other row is nearer than 1e-9 of the size.  Else Qhull on the dual of the minimal rows,
+        then each vertex from its rows again; corners closer than 1e-9 of the size are one.  The number of vertices, and
+        the cost, grow as m^(n/2).
 
         Raises
         ------

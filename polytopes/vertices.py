@@ -1,7 +1,8 @@
 """Vertices of bounded sets: in integers where the rows are short or the set is flat or thin (see `exact_generators`).
 
-Elsewhere Qhull does the combinatorics (the hull of the dual points), on coordinates centred in the set and scaled to
-about unit size along its own axes; flat sets are handled in their subspace.  Points are never rounded on the way.
+Sets in general position are gone through from vertex to vertex (see `general_position`).  For what is left Qhull does
+the combinatorics (the hull of the dual points), on coordinates centred in the set and scaled to about unit size along
+its own axes; flat sets are handled in their subspace.  Points are never rounded on the way.
 """
 
 import numpy as np
@@ -10,7 +11,8 @@ from polytopes.affine_hull import explicit
 from polytopes.checks import Floats
 from polytopes.errors import UnboundedError, UndecidedError
 from polytopes.frame import UnitBody, unit_body
-from polytopes.integers import floats_of_points
+from polytopes.general_position import simple_vertices
+from polytopes.integers import floats_of_points, maybe_short
 from polytopes.qhull import dual_hull
 from polytopes.redundancy import facets
 from polytopes.rows import Rows
@@ -32,6 +34,9 @@ def vertices(P: Rows) -> Floats:
     """
     if not known_nonempty(P):
         return np.empty((0, P.dim))
+    found = None if maybe_short(P.A, P.b) else simple_vertices(P.program)
+    if found is not None:
+        return found
     if not is_bounded(P):
         raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
     if P.exact is not None:

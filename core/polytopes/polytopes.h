@@ -10,6 +10,8 @@
  * clarkson.c     the same over the facets that are known so far
  * elimination.c  Fourier-Motzkin elimination
  * box.c          what needs no program
+ * cone.c         extreme rays of cones in general position, proven in floats
+ * double_description.c  extreme rays of any pointed cone, in integers
  *
  * Rows arrive scaled by powers of two, with Euclidean norms in [1/2, 2), and transposed, so that loops over rows are
  * contiguous. Sizes: d variables, m rows. An exported function works in a block of the caller's, of as many doubles as

@@ -62,6 +62,19 @@ def test_there_and_back_with_integers_beyond_machine_words() -> None:
         assert {tuple(row) for row in again.vertices.tolist()} == {tuple(row) for row in back.vertices.tolist()}
 
 
+def test_the_core_and_large_integers_make_the_same_rays(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    tables = [rng.integers(-9, 10, (int(rng.integers(4, 13)), int(rng.integers(2, 6)))) for _ in range(60)]
+    tables += [rng.integers(-(1 << bits), 1 << bits, (9, 4)) for bits in (10, 20, 30, 40, 50, 60) for _ in range(5)]
+    tables += [np.array([[2**62 - 1, 1], [1, 2**62 - 1], [-(2**61), 3]]), np.array([[2**62, 1], [1, 1]], dtype=object)]
+    by_core = [cone_generators(table) for table in tables]
+    monkeypatch.setattr("polytopes.kernel.double_description", lambda *_: None)
+    for table, (rays, lines) in zip(tables, by_core, strict=True):
+        again, same_lines = cone_generators(table)
+        np.testing.assert_array_equal(rays, again)
+        np.testing.assert_array_equal(lines, same_lines)
+
+
 def test_lines_and_a_cone_without_any_ray() -> None:
     rays, lines = cone_generators(np.array([[1, 1, 0], [-1, -1, 0]]))
     assert len(rays) == 0
