@@ -8,6 +8,7 @@ from polytopes.errors import EmptySetError, ProjectionLimitError, UnboundedError
 from polytopes.generators import Generators
 from polytopes.hpolytope import HPolytope
 from polytopes.linear_program import warm_up
+from polytopes.piecewise import Union
 from polytopes.redundancy import KeptRows
 from polytopes.separation import Intersects, SeparatingPlane
 from polytopes.support import Ball, SupportResult
@@ -29,6 +30,7 @@ __all__ = [
     "SupportResult",
     "UnboundedError",
     "UndecidedError",
+    "Union",
     "convex_hull",
     "union_bounds",
     "warm_up",

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 
 from polytopes import plotting
 from polytopes.checks import different_coordinates, real_array, whole_number
+from polytopes.constructions import Constructions
 from polytopes.generators import rows_of_generators
 from polytopes.operators import Operators
+from polytopes.piecewise import Union
 from polytopes.shown import Picture, Shown
 from polytopes.signatures import options_by_name
 from polytopes.support import known_nonempty
@@ -42,10 +44,11 @@ class HPolytope(Shown, Operators):
     and boxes are rounded outward, and every other number is computed in floats from true vertices.  Coordinates and
     rows are put into even units inside, so powers of two on them change nothing (see *Units* in the guide).
 
-    Operators, all exact or outward as the methods are: ``P & Q`` (intersection), ``P + Q`` and ``P + t`` (Minkowski
-    sum, translation), ``P - Q`` (Pontryagin difference), ``M @ P`` (image), ``-P``, ``s * P``, ``P ** k`` (product with
-    itself).  Decided about the floats as they are, without a tolerance: ``x in P``, ``P <= Q`` (P lies in Q) and
-    ``P == Q`` (the same set); they raise `UndecidedError` where that cannot be decided.  Sets have no hash.
+    Operators, all exact or outward as the methods are: ``P & Q`` (intersection), ``P | Q`` (a `Union`), ``P + Q`` and
+    ``P + t`` (Minkowski sum, translation), ``P - Q`` (Pontryagin difference), ``M @ P`` (image), ``-P``, ``s * P``,
+    ``P ** k`` (product with itself).  Decided about the floats as they are, without a tolerance: ``x in P``, ``P <= Q``
+    (P lies in Q) and ``P == Q`` (the same set); they raise `UndecidedError` where that cannot be decided.  Sets have no
+    hash.
     """
 
     @classmethod
@@ -118,6 +121,18 @@ class HPolytope(Shown, Operators):
         if not known_nonempty(self):
             return None
         return Picture(lambda ax: plotting.draw_shadow(self, ax))
+
+    def difference(self, Q: Constructions | Union) -> Union:
+        """The closure of ``{x in P : x not in Q}`` as a union of sets whose interiors are disjoint.  Exact.
+
+        Parameters
+        ----------
+        Q : HPolytope or Union
+        """
+        return Union([self]).difference(Q)
+
+    def __or__(self, Q: Constructions | Union) -> Union:
+        return Union([self]) | Q if isinstance(Q, Constructions | Union) else NotImplemented
 
     @options_by_name
     def plot(self, ax: Any = None, *, dims: Sequence[int] = (0, 1), **style: Any) -> list[Any]:

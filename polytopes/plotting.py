@@ -1,5 +1,6 @@
 """Pictures of sets: the shadow of a set on two or three coordinates."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,18 @@ def plot(P: Rows, ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list
     if len(dims) == 2:
         return _draw_polygon(ax, shadow(body, (dims[0], dims[1])), {"alpha": 0.4, **edge, **style})
     return _draw_faces(ax, Rows(*project(body, dims, "auto", _MAX_ROWS, False)), {"alpha": 0.4, **edge, **style})
+
+
+def plot_all(sets: Sequence[Rows], ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list[Any]:
+    """Draw the shadows of some sets on the same axes, in one colour; returns the artists."""
+    drawn: list[Any] = []
+    shared = style if "color" in style else {"facecolor": "C0", **style}
+    for P in sets:
+        drawn += plot(P, ax, dims, shared)
+        if drawn:
+            ax = drawn[-1].axes
+            shared = {key: value for key, value in shared.items() if key != "label"}  # one entry of a legend
+    return drawn
 
 
 def draw_shadow(P: Rows, ax: Any, **style: Any) -> list[Any]:
