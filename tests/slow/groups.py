@@ -37,7 +37,11 @@ COMMANDS = {
         ("benchmarks.soundness", "--observer", "zonotope", "--samples", "30000"),
         ("benchmarks.soundness", "--observer", "polytope", "--samples", "10000"),
     ),
-    "nonlinear": (("benchmarks.nonlinear", "--samples", "4800"), ("benchmarks.tape_operations", "--points", "50000")),
+    "nonlinear": (
+        ("benchmarks.nonlinear", "--samples", "4800"),
+        ("benchmarks.tape_operations", "--points", "50000"),
+        ("benchmarks.eclipse_banks", "--runs", "3", "--manoeuvres", "2"),
+    ),
     "mutation": (("tests.mutation",),),
     "core": (("tests.core.fuzz", "--cases", "5000"),),
     "fuzz": (("tests.fuzz", "--cases", "3000"),),

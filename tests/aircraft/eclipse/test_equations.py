@@ -7,6 +7,7 @@ import pytest
 
 from aircraft.eclipse.derivatives import Derivatives
 from aircraft.eclipse.equations import Equations, nonlinear_models
+from aircraft.eclipse.manoeuvres import manoeuvres
 from aircraft.eclipse.noise import NOISE_SETS
 from aircraft.eclipse.plant import INITIAL_LOWER, INITIAL_UPPER
 from aircraft.eclipse.scenarios import FAULTS, HEALTHY, LARGEST, TS, Scenarios
@@ -110,6 +111,18 @@ def test_the_true_state_is_inside_and_a_true_model_is_not_falsified(fault: str, 
         assert step.verdict == "consistent", (k, step.reason)
         lower, upper = step.box
         assert ((lower <= run.flight.x[k, :4]) & (run.flight.x[k, :4] <= upper)).all(), k
+
+
+def test_large_manoeuvres_raise_no_alarm_and_nothing_is_measured_for_them() -> None:
+    log = manoeuvres(5.0, "quiet", 9, SCENARIOS.fault("dynamics", "hard"))
+    assert log.x is not None
+    assert np.ptp(log.y[:, 0]) > 12.0
+    assert np.degrees(np.abs(log.x[:, 2]).max()) > 25.0
+    observer = WindowObserver(models()["dynamics"], HPolytope.box(INITIAL_LOWER, INITIAL_UPPER), horizon=10)
+    for step, x in zip(drive(observer, log), log.x, strict=True):
+        assert step.verdict == "consistent"
+        lower, upper = step.box
+        assert ((lower <= x) & (x <= upper)).all()
 
 
 def test_one_measurement_bounds_a_state_that_may_be_anywhere_as_well_as_the_sensors_allow() -> None:
