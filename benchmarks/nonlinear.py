@@ -44,7 +44,7 @@ def examine(name: str, i: int) -> dict[str, Any]:
     """One run of one plant: what happened."""
     rng = np.random.default_rng([SEED, list(CASES).index(name), i])
     case = CASES[name](**({"varying": "all"} if i // 3 % 2 else {}))
-    log = _run(case, rng, W_MODES[i % 3])
+    log = run(case, rng, W_MODES[i % 3])
     first = case.x0 - case.spread * rng.uniform(0.0, 2.0, len(case.x0)), log.x[0]
     lower, upper = np.minimum(*first), np.maximum(first[1], case.x0 + case.spread)
     observer = WindowObserver(case.model, HPolytope.box(lower, upper), horizon=10)
@@ -69,7 +69,7 @@ def examine(name: str, i: int) -> dict[str, Any]:
     return {"plant": name, "run": i, "count": count, "width": np.mean(widths, axis=0).tolist(), "seconds": seconds}
 
 
-def _run(case: Case, rng: np.random.Generator, w_mode: str) -> Log:
+def run(case: Case, rng: np.random.Generator, w_mode: str) -> Log:
     """A log with the truth, which starts in the first set."""
     model, flow, corners = case.model, case.model.flow, w_mode != "inside"
     x, inputs = case.x0 + case.spread * rng.uniform(-1.0, 1.0, len(case.x0)), case.inputs(RUN)

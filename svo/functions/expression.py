@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import is_finite_number
-from svo.functions.intervals import Interval, NotEnclosed, applied
 from svo.functions.operations import Op
+from svo.functions.tape_kernel import Interval, NotEnclosed, applied
 
 Slot = tuple[Op, tuple[int, ...], Interval]
 """An operation, the slots that it reads, and the ends of a constant (or the number of a variable, twice)."""

@@ -6,7 +6,6 @@ For dx/dt = A x + f(t) the state after a sample is exp(A Ts) x + int_0^Ts exp(A 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from flint import arb, arb_mat, ctx
@@ -17,7 +16,6 @@ from svo.checks import Array
 _FEW_BITS = 128  # of an exponential, twice as many where they lose too much
 _BITS = 512  # states in units of 2^-80 to 2^80 keep a float's digits
 _MOST_BITS = 8192
-_FEW_BITS = 128  # where what a float misses is bounded anyway
 _PARTS = 16  # of a sample, more where it is long against the dynamics
 _MOST_PARTS = 1024
 
@@ -36,42 +34,6 @@ def exponential(M: Array, Ts: float) -> Array:
 def _is_settled(value: arb) -> bool:
     """Whether a ball is known to far more digits than a float has; zeros of the matrix' structure are exact."""
     return bool(value.rad() == 0) or bool(value.rel_accuracy_bits() > 100)
-
-
-class Held(NamedTuple):
-    """Floats near exp(J h) and its integral over [0, h], and bounds of what each entry misses; all (n, n)."""
-
-    move: Array
-    gain: Array
-    move_error: Array
-    gain_error: Array
-
-
-def held(J: Array, h: float) -> Held:
-    """What dx/dt = J x + c comes to after h: move x + gain c."""
-    n = len(J)
-    with ctx.workprec(_FEW_BITS):
-        rows = _with_integral(J, h)
-        floats = np.array([[float(v.mid()) for v in row] for row in rows])
-        pairs = zip(rows, floats.tolist(), strict=True)
-        errors = _rounded_up([[abs(v - arb(f)) for v, f in zip(*pair, strict=True)] for pair in pairs])
-    return Held(floats[:, :n], floats[:, n:], errors[:, :n], errors[:, n:])
-
-
-def carried(J: Array, h: float) -> Array:
-    """int_0^h exp(M t) dt (n, n), rounded up, M being J with the absolute values of its off-diagonal entries.
-
-    It bounds, entry by entry, what a signal between -1 and 1 that enters each state adds to the states within h.
-    """
-    with ctx.workprec(_FEW_BITS):
-        return _rounded_up([row[len(J) :] for row in _with_integral(_metzler(J), h)])
-
-
-def _with_integral(M: Array, h: float) -> list[list[arb]]:
-    """Rows of exp(M h) and its integral over [0, h], side by side."""
-    n = len(M)
-    joint = (ball_matrix(np.block([[M, np.eye(n)], [np.zeros((n, 2 * n))]])) * arb(h)).exp()
-    return [[joint[i, j] for j in range(2 * n)] for i in range(n)]
 
 
 def growth(A: Array, Ts: float) -> Array:

@@ -3,7 +3,7 @@
 from svo.models.nonlinear.carrier import Linearisation
 from svo.models.nonlinear.flow import Span, Undecided
 from svo.models.nonlinear.model import NonlinearModel
-from svo.models.nonlinear.output import LinearOutput, cut
+from svo.models.nonlinear.output import LinearOutput
 from svo.models.nonlinear.transition import Transition
 
-__all__ = ["LinearOutput", "Linearisation", "NonlinearModel", "Span", "Transition", "Undecided", "cut"]
+__all__ = ["LinearOutput", "Linearisation", "NonlinearModel", "Span", "Transition", "Undecided"]

@@ -19,13 +19,12 @@ from svo.functions.tape import Tape
 from svo.logs.log import Log
 from svo.models.nonlinear.carrier import carrier_of
 from svo.models.nonlinear.flow import Flow, Span, Undecided
-from svo.models.nonlinear.output import LinearOutput, check_output, linear_output
+from svo.models.nonlinear.output import LinearOutput, check_output
+from svo.models.nonlinear.plant_kernel import PlantKernel
 from svo.models.nonlinear.simulation import given_values, simulated
 from svo.models.nonlinear.tracing import Function, OfVectors, Symbols, retraced, traced
-from svo.models.nonlinear.transition import Transition, mapped, transition
+from svo.models.nonlinear.transition import Transition
 from svo.models.state_range import StateRange, start_range, state_range
-
-_WORTH_ANOTHER = 0.1  # of the width of the set: a remainder beyond it is worth a second substep
 
 
 @options_by_name
@@ -206,6 +205,12 @@ class NonlinearModel(Value, Shown):
         is_disturbed = bool((self.reading.used[n : n + nw] & ~self.flow.varying).any())
         return carrier_of(self.flow, self.n_inputs, is_disturbed, self.noise, self.Ts, self.physical, self.largest)
 
+    @cached_property
+    def kernel(self) -> PlantKernel:
+        """The model in the core."""
+        outputs = self.outputs or ()
+        return PlantKernel(self.flow, self.reading, self.noise, self.continuous, self.start_range, outputs)
+
     @property
     def equations(self) -> tuple[OfVectors, OfVectors]:
         """f and h as functions of the vectors x, w, p and u that the model has, by these names: to make others of."""
@@ -242,20 +247,11 @@ class NonlinearModel(Value, Shown):
         """
         start = self._box(lower, upper)
         inputs: Array = finite_array("u", u, (self.n_inputs,))
-        if not self.continuous:
-            expect(dt is None, "dt", dt, "None for a model in discrete time")
-            found = mapped(self.flow, start, inputs)
-        else:
-            T = self.Ts if dt is None else positive_number("dt", dt, "number of seconds")
-            found = transition(self.flow, start, inputs, T)
-            if found.substeps == 1 and (found.R - _WORTH_ANOTHER * found.box.width > 0.0).any():
-                finer = transition(self.flow, start, inputs, T, least=2)
-                found = finer if (finer.R <= found.R).all() else found
-        beyond = found.R - (self.start_range.upper - self.start_range.lower)
-        if not (beyond <= 0.0).all():
-            j = int(np.argmax(beyond))
-            raise Undecided(f"the remainder of {self.states[j]} is wider than largest", coordinate=j)
-        return found
+        T = self.Ts
+        if dt is not None:
+            expect(self.continuous, "dt", dt, "None for a model in discrete time")
+            T = positive_number("dt", dt, "number of seconds")
+        return self.kernel.transition(*start, inputs, T)
 
     def output(self, lower: ArrayLike, upper: ArrayLike, u: ArrayLike = ()) -> LinearOutput:
         """h in C x + c + F (w, p) + [-R, R] for all states of a box, all w and all p; F has only what is held.
@@ -274,8 +270,7 @@ class NonlinearModel(Value, Shown):
             For a wrong shape, NaN or Inf.
         """
         inputs = finite_array("u", u, (self.n_inputs,))
-        flow, box = self.flow, self._box(lower, upper)
-        return linear_output(self.reading, flow.w, ~flow.varying, box, inputs, self.outputs or ())
+        return self.kernel.output(*self._box(lower, upper), inputs)
 
     def check_first(self, lower: Array, upper: Array) -> None:
         """Refuse first states from ``lower`` to ``upper`` (n,) for which the equations do not hold or have no value.
@@ -287,7 +282,6 @@ class NonlinearModel(Value, Shown):
         """
         box, unknown = Span(lower, upper), np.full(self.n_inputs, np.nan)
         try:
-            self.flow.check_valid(box)
             self.flow.check(box, unknown)
             check_output(self.reading, self.flow.w, box, unknown, self.outputs or ())
         except Undecided as error:

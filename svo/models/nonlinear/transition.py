@@ -1,29 +1,14 @@
-"""A transition: from dx/dt = f(x, w, u) over a box of states to x(T) in A x + a + E w + [-R, R].
-
-Conservative linearisation (Althoff, Stursberg and Buss, CDC 2008) with secants for Jacobians: substep by substep an
-enclosure, linear forms over it, an enclosed exponential, and the remainder carried through the integral of exp(M t),
-M being the slopes with absolute values off the diagonal: |exp(J t)| <= exp(M t) entry by entry.
-"""
+"""A transition: what a plant does from one sample to the next, as a linear model with a proven remainder."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
-import numpy as np
+from typing import NamedTuple
 
 from svo.checks import Array
-from svo.functions.tape import Forms
-from svo.models.inside_sample import carried, held
-from svo.models.nonlinear.flow import Flow, Span, Undecided
-
-_EPS = float(np.finfo(np.float64).eps)
-_FINEST = 4096  # substeps are multiples of so small a part of the sample
-_MOST = 200  # substeps
-_TINY = 2.0**-1000
+from svo.models.nonlinear.flow import Span
 
 
-@dataclass(frozen=True, eq=False)
-class Transition:
+class Transition(NamedTuple):
     """x+ in A x + a + E w + [-R, R] for all x of a box and all w of the model's bounds.
 
     Attributes
@@ -40,98 +25,3 @@ class Transition:
     R: Array
     box: Span
     substeps: int
-
-
-def transition(flow: Flow, start: Span, u: Array, T: float, least: int = 1) -> Transition:
-    """Of a continuous plant over a time T, for all states of a box, in at least so many substeps (a power of two).
-
-    Raises
-    ------
-    Undecided
-        If it is not enclosed, or the state may leave the range where the equations hold.
-    """
-    n, nw = flow.n, len(flow.varying)
-    start = flow.inside(start)
-    here = Transition(np.eye(n), np.zeros(n), np.zeros((n, nw)), np.zeros(n), start, 0)
-    done, size, why = 0, _FINEST // least, "the state moves too far for a linear model"
-    while done < _FINEST:
-        h = T * (size / _FINEST)  # exact: a power of two
-        try:
-            box, forms = flow.enclosure(here.box, u, h)
-            is_short = _scaled_norm(forms.g[:, :n], box, h) <= 1.0
-        except Undecided as error:
-            is_short, why = False, str(error)
-        if is_short:
-            flow.check_valid(box)
-            here, done = _after(flow, here, start, box, forms, h), done + size
-        elif size == 1 or (_FINEST - done) // size > _MOST:
-            raise Undecided(f"more than {_MOST} substeps would be needed: {why}")
-        else:
-            size //= 2
-    return here
-
-
-def mapped(flow: Flow, start: Span, u: Array) -> Transition:
-    """Of a plant in discrete time, x+ = f(x, w, u), for all states of a box.
-
-    Raises
-    ------
-    Undecided
-        As `transition`.
-    """
-    n, start = flow.n, flow.inside(start)
-    flow.check_valid(start)
-    forms = flow.forms(start, u)
-    c, k = forms.centre, forms.k + 0.5 * (forms.low + forms.high)
-    a = k - forms.g @ c
-    size = np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high) + np.abs(forms.g) @ (2.0 * np.abs(c))
-    R = 0.5 * (forms.high - forms.low) + (len(c) + 8) * _EPS * size + _TINY
-    found = Transition(forms.g[:, :n], a, forms.g[:, n:], R, Span(forms.lower, forms.upper), 1)
-    return replace(found, box=_newest(flow, found, start, found.box))
-
-
-def _scaled_norm(J: Array, box: Span, h: float) -> float:
-    """|D^-1 J D| h, D being powers of two near what the box and J move within h; it decides how short a substep is."""
-    reach = box.width + 1e-12 * box.largest + 1e-100
-    moved = 4.0 * h * (np.abs(J) @ reach)
-    unit = np.exp2(np.round(np.log2(reach + moved + 2.0 * h * (np.abs(J) @ moved))))
-    return float((np.abs(J) @ unit / unit).max() * h)
-
-
-def _after(flow: Flow, here: Transition, start: Span, box: Span, forms: Forms, h: float) -> Transition:
-    """One more substep, over which the state stays in ``box``."""
-    n, w = flow.n, flow.w
-    J, W = forms.g[:, :n], forms.g[:, n:]
-    kept = np.where(flow.varying, 0.0, 1.0)
-    shift = forms.centre * np.concatenate([np.ones(n), kept])  # what varies stays about its centre
-    middle, rest = 0.5 * (forms.low + forms.high), 0.5 * (forms.high - forms.low)
-    q = forms.k + middle - forms.g @ shift
-    size = np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high) + np.abs(forms.g) @ np.abs(forms.centre)
-    rounding = (n + len(kept) + 8) * _EPS
-    drive = rest + rounding * size + np.abs(W) @ ((1.0 - kept) * w.width * 0.5 * (1.0 + _EPS))
-    step, most = held(J, h), np.abs(W) @ w.largest + size
-    E = step.gain @ (W * kept)
-    lost = carried(J, h) @ drive + step.move_error @ box.largest + step.gain_error @ most
-    P = np.abs(step.move)
-    terms = P @ (np.abs(here.A) @ start.largest + np.abs(here.a) + np.abs(here.E) @ w.largest)
-    R = P @ here.R + lost
-    R = R + 2.0 * rounding * (terms + np.abs(step.gain) @ most + R) + _TINY
-    found = Transition(
-        step.move @ here.A, step.move @ here.a + step.gain @ q, step.move @ here.E + E, R, here.box, here.substeps + 1
-    )
-    end = Span(here.box.lower + h * forms.lower, here.box.upper + h * forms.upper)
-    room = 2.0 * _EPS * (box.largest + h * np.maximum(np.abs(forms.lower), np.abs(forms.upper)))
-    return replace(found, box=_newest(flow, found, start, Span(end.lower - room, end.upper + room)))
-
-
-def _newest(flow: Flow, found: Transition, start: Span, known: Span) -> Span:
-    """Bounds of x+: what a transition says, what is known besides, and what is physical."""
-    w = flow.w
-    y = found.A @ (0.5 * start.lower + 0.5 * start.upper) + found.a + found.E @ (0.5 * (w.lower + w.upper))
-    spread = np.abs(found.A) @ (0.5 * start.width) + np.abs(found.E) @ (0.5 * w.width) + found.R
-    terms = np.abs(found.A) @ start.largest + np.abs(found.a) + np.abs(found.E) @ w.largest + spread
-    spread = spread + 2.0 * (flow.n + len(w.lower) + 8) * _EPS * terms
-    box = flow.inside(Span(np.maximum(y - spread, known.lower), np.minimum(y + spread, known.upper)))
-    if not (box.lower <= box.upper).all():
-        raise Undecided("no state of the set stays within the physical range")
-    return box

@@ -13,15 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.models.nonlinear import Linearisation, LinearOutput, NonlinearModel, Span, Undecided, cut
+from svo.models.nonlinear import Linearisation, LinearOutput, NonlinearModel, Span, Undecided
 from svo.observers.saved_state import numbers
 
 _MEASURED = ("C", "c", "F", "n")  # what a sample has without a transition
 
 OUTSIDE_MODEL = "outside"  # how a reason begins that a sample is not linearised
-_BLUNT = 1e-3  # of the noise: a remainder of the output beyond it is worth another linearisation over what is left
-_WORTHWHILE = 0.8  # of a remainder that one more leaves, and yet another is worth it
-_CUTS = 10
 
 
 class Relinearised:
@@ -87,7 +84,7 @@ class Relinearised:
         """The newest sample without a transition, and its readings: none where the output is not enclosed."""
         model = self.model
         try:
-            output = self._cut(y, u)
+            output, self.box = model.kernel.measured(self.box, y, u)
         except Undecided as error:
             self.reason = self.reason or f"{OUTSIDE_MODEL}: at sample {sample}, {error}"
             nothing = [np.zeros((len(y), size)) for size in (model.n_states, len(model.flow.varying))]
@@ -95,21 +92,6 @@ class Relinearised:
             y = np.full(len(y), np.nan)
         self.now = Linearisation.before(output, model.noise)
         return self.now, y
-
-    def _cut(self, y: Array, u: Array) -> LinearOutput:
-        """The output over the box, which it cuts; again over what is left while its remainder blurs the readings."""
-        noise, w = self.model.noise, self.model.flow.w
-        before = np.full(len(noise), np.inf)
-        for _ in range(_CUTS):
-            output = self.model.output(self.box.lower, self.box.upper, u)
-            left = cut(self.box, y, output, w, noise)
-            if left is None:
-                break
-            self.box = left
-            if not ((_BLUNT * noise < output.R) & (_WORTHWHILE * before > output.R)).any():
-                break
-            before = output.R
-        return output
 
     # -- saved states ------------------------------------------------------------------------------------
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from flint import arb
 
 from polytopes.exact import ball_up
-from svo.functions.intervals import Interval, add, applied, ball_below, down, inv, mul, neg, sqr, sub, up
 from svo.functions.operations import Op
+from tests.svo.functions.oracle.intervals import Interval, add, applied, ball_below, down, inv, mul, neg, sqr, sub, up
 
 _GOLDEN = 0.6180339887498949
 _NEAR = 1e-7  # relative width of [a, b] below which a chord's slope is lost to rounding

@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from svo.functions.intervals import (
+from svo.functions.operations import Op
+from tests.svo.functions.oracle.intervals import (
     WHOLE_TURN,
     Interval,
     NotEnclosed,
@@ -24,8 +25,7 @@ from svo.functions.intervals import (
     sub,
     up,
 )
-from svo.functions.operations import Op
-from svo.functions.secants import secant
+from tests.svo.functions.oracle.secants import secant
 
 _EPS = 2.0**-52  # twice what one rounding takes, so that bounds of rounding may be rounded too
 _TINY = 2.0**-1022  # more than what products lose that are no normal floats

@@ -1,0 +1,98 @@
+/* A box that a state does not leave within a step.
+ *
+ * A trajectory that keeps to the physical range leaves a box through a face of that range or not at all, if the box
+ * contains start + [0, h] f(box) in its interior elsewhere: on its first way out it would still have the derivatives of
+ * the box. Neither a Lipschitz constant nor uniqueness is needed.
+ */
+#include "tape/plant.h"
+
+static const integer TRIALS = 15;       /* of ever larger boxes */
+static const integer PASSES = 6;        /* of narrowing, most of the time one */
+static const double WORTHWHILE = 0.95;  /* of a width that another pass has left */
+
+/* before + [0, h] f, rounded outward. */
+static void take_image(const plant *p, double h)
+{
+    for (integer i = 0; i < p->n; i++) {
+        const double down = smaller(0.0, h * p->rate.low[i]), up = larger(0.0, h * p->rate.high[i]);
+        const double low = p->before.low[i], high = p->before.high[i];
+        p->image.low[i] = low + down - 2.0 * ROUNDING * (fabs(low) - down) - 0x1p-1022;
+        p->image.high[i] = high + up + 2.0 * ROUNDING * (fabs(high) + up) + 0x1p-1022;
+    }
+}
+
+static void grow(const plant *p, integer trial)
+{
+    const span box = p->z;
+    for (integer i = 0; i < p->n; i++) {
+        const double wide = box.high[i] - box.low[i], growth = wide - (p->before.high[i] - p->before.low[i]);
+        const double room =
+            (0.02 + 0.1 * (double)trial) * growth + 1e-9 * wide + 1e-14 * largest_of(box, i) + 1e-200;
+        box.low[i] -= room;
+        box.high[i] += room;
+    }
+    cut_by_physical(p, box);
+}
+
+/* Strictly, but for faces of the physical range. */
+static int image_is_inside(const plant *p)
+{
+    int inside = 1;
+    for (integer i = 0; i < p->n; i++)
+        inside &= (p->image.low[i] > p->z.low[i] || p->z.low[i] <= p->physical_low[i])
+                  && (p->image.high[i] < p->z.high[i] || p->z.high[i] >= p->physical_high[i]);
+    return inside;
+}
+
+/* Returns whether that narrows it by more than a little. */
+static int cut_by_image(const plant *p)
+{
+    int helps = 0;
+    for (integer i = 0; i < p->n; i++) {
+        const double wide = p->z.high[i] - p->z.low[i];
+        p->z.low[i] = larger(p->z.low[i], p->image.low[i]);
+        p->z.high[i] = smaller(p->z.high[i], p->image.high[i]);
+        helps |= p->z.high[i] - p->z.low[i] < WORTHWHILE * wide;
+    }
+    return helps;
+}
+
+static void join_image(const plant *p)
+{
+    for (integer i = 0; i < p->n; i++) {
+        p->z.low[i] = smaller(p->z.low[i], p->image.low[i]);
+        p->z.high[i] = larger(p->z.high[i], p->image.high[i]);
+    }
+}
+
+static int find_box(plant *p, double h, outcome *found)
+{
+    span_copy(p->z, p->before, p->n);
+    if (!plant_rates(p, found)) return 0;
+    take_image(p, h);
+    span_copy(p->z, p->image, p->n);
+    for (integer trial = 0; trial < TRIALS; trial++) {
+        grow(p, trial);
+        if (!plant_rates(p, found)) return 0;
+        take_image(p, h);
+        if (image_is_inside(p)) {
+            cut_by_image(p);
+            return 1;
+        }
+        join_image(p);
+    }
+    *found = (outcome){.code = NOT_ENCLOSED, .why = NO_BOX, .time = h};
+    return 0;
+}
+
+int plant_enclose(plant *p, double h, outcome *found)
+{
+    if (!find_box(p, h, found) || !plant_forms(p, found)) return 0;
+    for (integer pass = 0; pass < PASSES; pass++) {
+        take_image(p, h);
+        const int helps = cut_by_image(p);
+        if (!plant_forms(p, found)) return 0;
+        if (!helps) break;
+    }
+    return 1;
+}
