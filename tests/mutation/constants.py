@@ -49,6 +49,7 @@ SETS = "tests/polytopes"
 POLYTOPE = "tests/svo/observers/polytope"
 WINDOW = "tests/svo/observers/window"
 LONG = f"{WINDOW}/test_long_windows.py"
+TAPES = "tests/svo/functions"
 
 CONSTANTS = (
     Constant("svo.models.discretisation", "_ROUNDED_UP", "outward", "tests/svo/models/test_inside_a_sample.py"),
@@ -85,6 +86,13 @@ CONSTANTS = (
             ("angle", "ANGLE"),
         )
     ),
+    Constant("core/tape/intervals.h", "OUTWARD", "outward", f"{TAPES}/test_tape_operations.py"),
+    Constant("core/tape/forms.c", "ROUNDED", "outward", f"{TAPES}/test_random_tapes.py"),
+    Constant("core/tape/plant.h", "ROUNDING", "outward", "tests/svo/models/test_core_transitions.py"),
+    *(
+        Constant("core/tape/matrix_exponential.c", name, "outward", "tests/svo/models/test_enclosed_exponential.py")
+        for name in ("ROUNDED", "TAIL", "VANISHED")
+    ),
     Constant("core/polytopes/facets.c", "TOLERANCE", "tolerance", f"{SETS}/test_row_redundancy.py"),
     *(
         Constant(f"core/{file}", name, "heuristic")
@@ -107,6 +115,12 @@ CONSTANTS = (
             "polytopes/programs.c": ("CHAINED",),
             "polytopes/scaling.c": ("SWEEPS", "STILL"),
             "polytopes/sums.h": ("UNDERFLOW_BELOW",),
+            "tape/secants.c": ("NEAR", "FLAT_ROOT"),
+            "tape/form_of_angle.c": ("NO_DIRECTION",),
+            "tape/enclosure.c": ("WORTHWHILE",),
+            "tape/transition.c": ("WORTH_ANOTHER",),
+            "tape/output.c": ("BLUNT", "WORTHWHILE"),
+            "tape/matrix_exponential.c": ("LAST",),
             "window/factors.c": ("LEFT_OVER", "TOO_MUCH"),
             "window/ratio_test.c": ("SMALL_PIVOT", "NO_PIVOT", "SAME"),
             "window/dual_simplex.c": ("FEASIBILITY", "NEAR_WORST", "REFACTOR", "STALLED"),
