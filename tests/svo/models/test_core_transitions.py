@@ -68,7 +68,9 @@ def test_outputs_and_what_readings_leave_of_a_box_are_those_of_balls(name: str) 
     tape = Evaluation(model.reading)
     for lower, upper, u in boxes(case, rng, 10):
         x = case.x0 + case.spread * rng.uniform(-1.0, 1.0, len(case.x0))
-        y = model.reading.values(np.concatenate([x, flow.w.lower, u])) + model.noise * rng.uniform(-1, 1, len(model.noise))
+        y = model.reading.values(np.concatenate([x, flow.w.lower, u])) + model.noise * rng.uniform(
+            -1, 1, len(model.noise)
+        )
         try:
             here, left = model.kernel.measured(Span(lower, upper), y, u)
             there = linear_output(tape, flow.w, ~flow.varying, Span(lower, upper), u, model.outputs or ())
@@ -125,6 +127,19 @@ def test_what_rounding_takes_of_a_linear_flow_is_in_its_remainder() -> None:
             for i in range(3):
                 assert abs(end[i, 0] - said[i, 0]) <= arb(float(found.R[i]))
                 assert arb(float(found.box.lower[i])) <= end[i, 0] <= arb(float(found.box.upper[i]))
+
+
+def test_a_box_holds_what_no_double_does() -> None:
+    """A step whose sum is rounded back to where it began."""
+    for first, step in ((1e16, 1.0), (-1e16, -1.0), (1e300, 1e283)):
+        model = NonlinearModel(
+            lambda x, step=step: [step], lambda x: x, states=["x"], largest=([-2e300], [2e300]), Ts=1.0
+        )  # fmt: skip
+        found = model.transition([first], [first])
+        end = Fraction(first) + Fraction(step)
+        assert first + step == first
+        assert Fraction(float(found.box.lower[0])) <= end <= Fraction(float(found.box.upper[0]))
+        assert abs(end - Fraction(float(found.A[0, 0])) * Fraction(first) - Fraction(float(found.a[0]))) <= found.R[0]
 
 
 @pytest.mark.parametrize("power", [-300, -40, 40, 300])

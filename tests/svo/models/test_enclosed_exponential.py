@@ -86,8 +86,8 @@ def test_what_is_left_out_of_the_series_is_in_the_bound() -> None:
 
 def test_what_underflow_takes_is_in_the_bound() -> None:
     """A product that is no normal double loses more than its roundings."""
-    h, slope = 0.3, 2.0**-1040
-    move, gain, move_error, gain_error, _ = taken(np.array([[0.0, slope], [0.0, 0.0]]), h, np.ones(2), 1.0)
+    h, slope, unit = 0.3, 2.0**-1040, np.array([2.0**-1000, 1.0])  # so that the rest of the series hides nothing
+    move, gain, move_error, gain_error, _ = taken(np.array([[0.0, slope], [0.0, 0.0]]), h, unit, 2.0**-41)
     exact = Fraction(slope) * Fraction(h)
     assert abs(exact - Fraction(float(move[0, 1]))) > Fraction(move[0, 1]) * Fraction(2.0**-53)
     assert abs(exact - Fraction(float(move[0, 1]))) <= Fraction(float(move_error[0, 1]))
