@@ -1,4 +1,4 @@
-"""Random tapes beside ball arithmetic: rows at random points of random boxes, inside the forms and ranges of the core."""
+"""Random tapes beside ball arithmetic: rows at random points of random boxes, inside the core's forms and ranges."""
 
 from __future__ import annotations
 
