@@ -2,7 +2,8 @@
  *
  * A trajectory that keeps to the physical range leaves a box through a face of that range or not at all, if the box
  * contains start + [0, h] f(box) in its interior elsewhere: on its first way out it would still have the derivatives of
- * the box. Neither a Lipschitz constant nor uniqueness is needed.
+ * the box. Neither a Lipschitz constant nor uniqueness is needed. A coordinate that pulls itself back is then enclosed
+ * by what its derivative is at its own ends.
  */
 #include "tape/plant.h"
 
@@ -65,6 +66,29 @@ static void join_image(const plant *p)
     }
 }
 
+/* What f adds at most to how far each coordinate is from where it began, in place of bounds over the whole box: where
+ * f_i falls with x_i, v = x_i - high_i has v' <= g_ii v + F, F being the form's bound at x_i = high_i, and v <= 0 at
+ * first: so v(t) <= t max(F, 0), whatever f_i is at a smaller x_i. */
+static void hold_at_faces(const plant *p)
+{
+    const integer count = p->n + p->nw;
+    const double *c = p->f.centre, *radius = p->f.radius;
+    for (integer i = 0; i < p->n; i++) {
+        const form *f = row_of(&p->f, i);
+        const double own = f->g[i];
+        double others = 0.0;
+        if (own > 0.0) continue;
+        for (integer j = 0; j < count; j++)
+            if (j != i) others += fabs(f->g[j]) * radius[j];
+        const double size = others + fabs(own) * radius[i] + fabs(f->k) + fabs(f->rest.low) + fabs(f->rest.high);
+        const double lost = (double)(count + 8) * ROUNDING * size;
+        const double low = f->k + own * (p->before.low[i] - c[i]) - others + f->rest.low - lost;
+        const double high = f->k + own * (p->before.high[i] - c[i]) + others + f->rest.high + lost;
+        p->rate.low[i] = larger(low, p->rate.low[i]);
+        p->rate.high[i] = smaller(high, p->rate.high[i]);
+    }
+}
+
 static int find_box(plant *p, double h, outcome *found)
 {
     span_copy(p->z, p->before, p->n);
@@ -89,6 +113,7 @@ int plant_enclose(plant *p, double h, outcome *found)
 {
     if (!find_box(p, h, found) || !plant_forms(p, found)) return 0;
     for (integer pass = 0; pass < PASSES; pass++) {
+        hold_at_faces(p);
         take_image(p, h);
         const int helps = cut_by_image(p);
         if (!plant_forms(p, found)) return 0;

@@ -131,6 +131,30 @@ static void multiplied(const form *a, const form *b, fdi_interval values, const 
     rounded(found, size, s);
 }
 
+/* a / b = q + (a - q b) / b: with q that of the centres, what a and b have in common leaves the numerator. */
+static void divided(const form *a, const form *b, fdi_interval values, const support *s, form *spare, form *found)
+{
+    form *over = spare, *part = spare + 1, *left = spare + 2, *whole = spare + 3, *shared = spare + 4, *q_form = spare + 5;
+    const fdi_interval inverted = inverse(b->range);
+    const secant by = tape_secant(INV, b->range, inverted);
+    form_sloped(b, by.slope, by.rest, inverted, s, over);
+    multiplied(a, over, product(a->range, over->range), s, found);
+    const double q = a->k / b->k;
+    if (!(fabs(q) < 1e300)) {
+        form_within(found, values, s);
+        return;
+    }
+    const fdi_interval scaled_b = product(at(q), b->range);
+    form_sloped(b, q, at(0.0), scaled_b, s, part);
+    form_sum(a, part, -1.0, difference(a->range, part->range), s, left);
+    multiplied(left, over, product(left->range, over->range), s, whole);
+    form_of_constant(q_form, at(q), s);
+    form_sum(q_form, whole, 1.0, sum(at(q), whole->range), s, shared);
+    const fdi_interval plain = found->range;
+    if (width(shared->rest) < width(found->rest)) copied(shared, s, found);
+    form_within(found, interval(larger(plain.low, shared->range.low), smaller(plain.high, shared->range.high)), s);
+}
+
 /* b + max(a - b, 0), where either may be the larger one. */
 static void maximum(const form *a, const form *b, fdi_interval values, const support *s, form *spare, form *found)
 {
@@ -173,6 +197,7 @@ int form_applied(integer op, const form *a, const form *b, const form *c, fdi_in
     case ADD: form_sum(a, b, 1.0, values, s, found); break;
     case SUB: form_sum(a, b, -1.0, values, s, found); break;
     case MUL: multiplied(a, b, values, s, found); break;
+    case DIV: divided(a, b, values, s, spare, found); break;
     case MAX: maximum(a, b, values, s, spare, found); break;
     case SELECT: chosen(a, b, c, values, s, spare, found); break;
     case ATAN2: form_angle(a, b, values, s, spare, found); break;

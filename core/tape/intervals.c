@@ -28,6 +28,10 @@ int fdi_interval_applied(integer op, const fdi_interval *a, const fdi_interval *
         if (a->low <= 0.0 && 0.0 <= a->high) return DIVIDES_BY_ZERO;
         *value = inverse(*a);
         break;
+    case DIV:
+        if (b->low <= 0.0 && 0.0 <= b->high) return DIVIDES_BY_ZERO;
+        *value = product(*a, inverse(*b));
+        break;
     case SQRT:
         if (a->low < 0.0) return ROOT_OF_NEGATIVE;
         *value = root(*a);

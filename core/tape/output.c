@@ -110,8 +110,22 @@ EXPORTED integer fdi_plant_output(const double *block, double *scratch, const do
     return !take_output(&p, &o, found);
 }
 
-/* The same over the set that is known, which the readings y (ny, NaN where there is none) cut: low and high are given
- * back. Again over what is left while the remainder blurs the readings. Returns whether h has no form. */
+/* What readings y (ny, NaN where there is none) leave of the states between low and high, by an output that holds for
+ * them. Returns whether anything is left; if not, they stay. */
+EXPORTED integer fdi_plant_cut(const double *block, double *scratch, double *low, double *high, const double *y,
+                               double *result)
+{
+    plant p;
+    plant_open(&p, block, (Memory){scratch, 0});
+    const output o = output_at(&p, result);
+    const span known = {low, high};
+    span_copy(p.z, known, p.n);
+    if (!cut_by_readings(&p, &o, y)) return 0;
+    span_copy(known, p.z, p.n);
+    return 1;
+}
+
+/* An output over the set that is known, which the readings y cut: low and high are given back. Again over what is left while the remainder blurs the readings. Returns whether h has no form. */
 EXPORTED integer fdi_plant_measured(const double *block, double *scratch, double *low, double *high, const double *y,
                                     const double *u, double *result, outcome *found)
 {

@@ -26,8 +26,8 @@ typedef struct { double *low, *high; } span;
     Y(physical_low, n) Y(physical_high, n) Y(valid_low, n) Y(valid_high, n) Y(largest, n) Y(w_low, nw) Y(w_high, nw) \
     Y(held, nw) Y(noise, ny)
 
-/* x+ in A x + a + E w + [-R, R] for all x in start, and x+ in box. */
-typedef struct { double *A, *a, *E, *R; span start, box; integer substeps; } transition;
+/* x+ in A x + a + E w + [-R, R] for all x in start, x+ in box, and the state on its way in `within`. */
+typedef struct { double *A, *a, *E, *R; span start, box, within; integer substeps; } transition;
 
 typedef struct {
 #define SIZE(name) integer name;

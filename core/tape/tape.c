@@ -17,7 +17,7 @@ const double *tape_open(tape *t, const double *block, Memory *scratch)
     t->constant = (const double *)(const void *)(t->column + t->listed);
     t->range = (fdi_interval *)(void *)doubles(scratch, 2 * t->slots);
     t->form = (form *)(void *)doubles(scratch, (integer)((sizeof(form) + 7) / 8) * t->slots);
-    t->g = doubles(scratch, (t->slots + 3) * t->free);
+    t->g = doubles(scratch, (t->slots + SPARE) * t->free);
     t->centre = doubles(scratch, t->free);
     t->radius = doubles(scratch, t->free);
     t->why = integers(scratch, t->slots);
@@ -123,9 +123,9 @@ static void take_form(const tape *t, integer i, const support *s, form *spare)
 int tape_forms(const tape *t, const double *lower, const double *upper, refusal *refused)
 {
     support s = box_of(t, lower, upper);
-    form spare[3];
-    fill(t->g, 0.0, (t->slots + 3) * t->free); /* a form is zero where its slot reads nothing */
-    for (integer i = 0; i < 3; i++) spare[i].g = t->g + (t->slots + i) * t->free;
+    form spare[SPARE];
+    fill(t->g, 0.0, (t->slots + SPARE) * t->free); /* a form is zero where its slot reads nothing */
+    for (integer i = 0; i < SPARE; i++) spare[i].g = t->g + (t->slots + i) * t->free;
     for (integer i = 0; i < t->slots; i++) {
         const integer j = operands_of(t, i)[0];
         form *f = t->form + i;
@@ -174,9 +174,9 @@ EXPORTED integer fdi_tape_ranges(const double *block, double *scratch, const dou
     return 0;
 }
 
-/* Forms over a box: k, rest and range (rows, 5), g (rows, free), centre (free). */
+/* Forms over a box: k, rest and range (rows, 5), g (rows, free); its centre and half-widths (2, free). */
 EXPORTED integer fdi_tape_forms(const double *block, double *scratch, const double *lower, const double *upper,
-                                double *values, double *g, double *centre, integer *told)
+                                double *values, double *g, double *box, integer *told)
 {
     tape t;
     Memory memory = {scratch, 0};
@@ -192,6 +192,7 @@ EXPORTED integer fdi_tape_forms(const double *block, double *scratch, const doub
         copy(values + 5 * row, found, 5);
         copy(g + row * t.free, f->g, t.free);
     }
-    copy(centre, t.centre, t.free);
+    copy(box, t.centre, t.free);
+    copy(box + t.free, t.radius, t.free);
     return 0;
 }

@@ -14,13 +14,15 @@
 #include "tape/intervals.h"
 
 enum { VARIABLE, CONSTANT, NEG, ADD, SUB, MUL, SQR, INV, SQRT, EXP, LOG, SIN, COS, TANH, ABS, SIGN, SROOT, MAX, ATAN2,
-       SELECT }; /* as svo.functions.operations.Op */
+       SELECT, DIV }; /* as svo.functions.operations.Op */
 
 /* phi(s) - slope s in rest. */
 typedef struct { double slope; fdi_interval rest; } secant;
 
 /* reach bounds |g (z - c)| up to rounding. */
 typedef struct { double k, reach; fdi_interval rest, range; double *g; } form;
+
+enum { SPARE = 6 }; /* forms that an operation needs on its way */
 
 /* What forms are about: half-widths of z - c, more than underflow takes, and the coordinates that this slot reads. */
 typedef struct { const double *radius; double tiny; const integer *column; integer count; } support;
@@ -35,7 +37,7 @@ typedef struct {
     const double *constant;                                /* ends (slots, 2) */
     fdi_interval *range;                                   /* (slots) */
     form *form;                                            /* (slots) */
-    double *g, *centre, *radius;                           /* (slots + 3, free), (free), (free) */
+    double *g, *centre, *radius;                           /* (slots + SPARE, free), (free), (free) */
     integer *why, *where; /* why a slot has no value, and the slot where it began */
 } tape;
 
@@ -57,7 +59,7 @@ static inline fdi_interval range_of_row(const tape *t, integer row) { return t->
 
 secant tape_secant(integer op, fdi_interval a, fdi_interval values);
 
-/* The form of an operation whose range is known; returns 0 if it is not bounded by doubles. `spare` has three forms. */
+/* The form of an operation whose range is known; returns 0 if it is not bounded by doubles. `spare` has SPARE forms. */
 int form_applied(integer op, const form *a, const form *b, const form *c, fdi_interval values, const support *s,
                  form *spare, form *found);
 void form_of_coordinate(form *f, double centre, double radius, fdi_interval values, integer column);

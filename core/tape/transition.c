@@ -17,7 +17,7 @@ static transition transition_in(Memory *memory, const plant *p)
 {
     const integer n = p->n;
     transition t = {doubles(memory, n * n), doubles(memory, n), doubles(memory, n * p->nw), doubles(memory, n),
-                    span_in(memory, n), span_in(memory, n), 0};
+                    span_in(memory, n), span_in(memory, n), span_in(memory, n), 0};
     return t;
 }
 
@@ -155,6 +155,8 @@ static int advance(const plant *p, const transition *old, const local *d, const 
         const double room = 2.0 * ROUNDING * (largest_of(p->z, i) + h * larger(fabs(low), fabs(high)));
         t->box.low[i] = old->box.low[i] + h * low - room;
         t->box.high[i] = old->box.high[i] + h * high + room;
+        t->within.low[i] = smaller(old->within.low[i], p->z.low[i]);
+        t->within.high[i] = larger(old->within.high[i], p->z.high[i]);
     }
     t->start = old->start, t->substeps = old->substeps + 1;
     return take_newest(p, t, found);
@@ -176,6 +178,7 @@ static void stand_still(const plant *p, transition *t)
     fill(t->A, 0.0, n * n), fill(t->a, 0.0, n), fill(t->E, 0.0, n * p->nw), fill(t->R, 0.0, n);
     for (integer i = 0; i < n; i++) t->A[i * n + i] = 1.0;
     span_copy(t->box, t->start, n);
+    span_copy(t->within, t->start, n);
     t->substeps = 0;
 }
 
@@ -249,6 +252,7 @@ static int map(plant *p, transition *t, outcome *found)
         t->R[i] = 0.5 * (f->rest.high - f->rest.low) + rounding_of(p) * size + TINIEST;
         t->box.low[i] = f->range.low, t->box.high[i] = f->range.high;
     }
+    span_copy(t->within, t->start, n);
     t->substeps = 1;
     return take_newest(p, t, found);
 }
@@ -271,9 +275,9 @@ static int move_well(plant *p, double T, transition *t, transition *other, trans
 static void give(const plant *p, const transition *t, double *result)
 {
     const integer n = p->n;
-    const double *parts[] = {t->A, t->a, t->E, t->R, t->box.low, t->box.high};
-    const integer lengths[] = {n * n, n, n * p->nw, n, n, n};
-    for (int i = 0; i < 6; i++) {
+    const double *parts[] = {t->A, t->a, t->E, t->R, t->box.low, t->box.high, t->within.low, t->within.high};
+    const integer lengths[] = {n * n, n, n * p->nw, n, n, n, n, n};
+    for (int i = 0; i < 8; i++) {
         copy(result, parts[i], lengths[i]);
         result += lengths[i];
     }
@@ -299,8 +303,8 @@ EXPORTED integer fdi_plant_room(const double *block)
     return p.rest.used + fdi_exponential_room(p.n) + p.ny;
 }
 
-/* The transition over a time T of all states between low and high (n): A, a, E, R and the bounds of x+ in `result`, in
- * this order. Returns its substeps, or minus the code of what came of it. */
+/* The transition over a time T of all states between low and high (n): A, a, E, R, the bounds of x+ and of the state on
+ * its way in `result`, in this order. Returns its substeps, or minus the code of what came of it. */
 EXPORTED integer fdi_plant_transition(const double *block, double *scratch, const double *low, const double *high,
                                       const double *u, double T, double *result, outcome *found)
 {

@@ -1,7 +1,7 @@
 """The core's tapes (`core/tape`): a tape as one block of memory, its ranges and its linear forms over a box.
 
-`svo.functions` and the models use it. A block is only read, and no address is in it; what a call computes on the way lies
-in the scratch of its thread.
+`svo.functions` and the models use it. A block is only read, and no address is in it; what a call computes on the
+way lies in the scratch of its thread.
 """
 
 from __future__ import annotations
@@ -77,12 +77,14 @@ class Forms(NamedTuple):
 
     Attributes
     ----------
-    centre : (free,) array
+    centre, reach : (free,) arrays
+        Of the box: its centre, and bounds of abs(z - centre).
     k, low, high, lower, upper : (m,) arrays
     g : (m, free) array
     """
 
     centre: Array
+    reach: Array
     k: Array
     g: Array
     low: Array
@@ -158,8 +160,9 @@ class Block:
             If a row has no bounded range.
         """
         values, g = np.empty((self.rows, 5)), np.empty((self.rows, self.free))
-        centre, told = np.empty(self.free), np.empty(3, dtype=np.int64)
-        if _forms(self._address, native.scratch(self._room), lower, upper, values, g, centre, told):
+        box, told = np.empty((2, self.free)), np.empty(3, dtype=np.int64)
+        if _forms(self._address, native.scratch(self._room), lower, upper, values, g, box, told):
             raise Unenclosed(*told.tolist())
+        centre, reach = box
         k, *ends = values.T.copy()
-        return Forms(centre, k, g, *ends)
+        return Forms(centre, reach, k, g, *ends)

@@ -78,15 +78,19 @@ class Flow:
         Undecided
             Naming the state.
         """
+        self.check_valid(x)
+        try:
+            self.tape.ranges(*joint(x, self.w, u))
+        except Unenclosed as error:
+            raise Undecided(f"the equation of {self.states[error.row]} is not enclosed, {error}") from None
+
+    def check_valid(self, x: Span) -> None:
+        """Raise Undecided if a box of states reaches beyond where the equations hold."""
         if self.valid is not None:
             beyond = (x.lower < self.valid.lower) | (x.upper > self.valid.upper)
             if beyond.any():
                 j = int(np.argmax(beyond))
                 raise self.outside_valid(j, x.lower[j], x.upper[j])
-        try:
-            self.tape.ranges(*joint(x, self.w, u))
-        except Unenclosed as error:
-            raise Undecided(f"the equation of {self.states[error.row]} is not enclosed, {error}") from None
 
     def outside_valid(self, j: int, lower: float, upper: float) -> Undecided:
         """That state j may be between these bounds."""

@@ -337,9 +337,7 @@ class NonlinearModel(Value, Shown):
         expect(is_count(substeps, 1), "substeps", substeps, "a number of steps >= 1")
         T = self.Ts if self.continuous else None
         given = given_values(self.flow, list(self.parameters), parameters or {}, len(inputs))
-        return simulated(
-            self.flow, self.reading, self.noise, self.Ts, x, inputs, rng, corners, T, int(substeps), given
-        )
+        return simulated(self.flow, self.reading, self.noise, self.Ts, x, inputs, rng, corners, T, int(substeps), given)
 
 
 def _names(what: str, given: Any) -> tuple[str, ...]:

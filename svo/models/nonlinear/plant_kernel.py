@@ -22,6 +22,7 @@ _transition = native.function(
     "fdi_plant_transition", Address, Address, *[Given] * 3, Real, Entries, Entries, returns=Integer
 )
 _output = native.function("fdi_plant_output", Address, Address, *[Given] * 3, Entries, Entries, returns=Integer)
+_cut = native.function("fdi_plant_cut", Address, Address, *[Entries] * 2, Given, Entries, returns=Integer)
 _measured = native.function(
     "fdi_plant_measured", Address, Address, *[Entries] * 2, *[Given] * 2, Entries, Entries, returns=Integer
 )
@@ -93,13 +94,13 @@ class PlantKernel:
             If it is not enclosed, leaves `valid`, or leaves out more than ``largest`` is wide.
         """
         n, nw, _ = self._sizes
-        result, told = np.empty(n * (n + nw + 4)), np.empty(8)
+        result, told = np.empty(n * (n + nw + 6)), np.empty(8)
         substeps = _transition(self._address, native.scratch(self._room), lower, upper, u, T, result, told)
         if substeps < 0:
             raise self._undecided(told)
         square, E = result[: n * n].reshape(n, n), result[n * (n + 1) : n * (n + 1 + nw)].reshape(n, nw)
-        R, low, high = result[n * (n + 1 + nw) :].reshape(3, n)
-        return Transition(square, result[n * n : n * (n + 1)], E, R, Span(low, high), substeps)
+        R, *ends = result[n * (n + 1 + nw) :].reshape(5, n)
+        return Transition(square, result[n * n : n * (n + 1)], E, R, Span(*ends[:2]), Span(*ends[2:]), substeps)
 
     def output(self, lower: Array, upper: Array, u: Array) -> LinearOutput:
         """Of all states of a box.
@@ -127,6 +128,11 @@ class PlantKernel:
         if _measured(self._address, native.scratch(self._room), *left, y, u, result, told):
             raise self._undecided(told, is_output=True)
         return self._linear(result), left
+
+    def cut(self, known: Span, y: Array, output: LinearOutput) -> Span | None:
+        """What readings leave of a box for which an output holds; None where nothing is left: a program decides."""
+        left, result = Span(known.lower.copy(), known.upper.copy()), np.concatenate([part.ravel() for part in output])
+        return left if _cut(self._address, native.scratch(self._room), *left, y, result) else None
 
     def _result(self) -> tuple[Array, Array]:
         n, nw, ny = self._sizes

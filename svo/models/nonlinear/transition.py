@@ -14,8 +14,8 @@ class Transition(NamedTuple):
     Attributes
     ----------
     A, a, E, R : (n, n), (n,), (n, nw), (n,) arrays
-    box : Span
-        Bounds of x+.
+    box, within : Span
+        Bounds of x+, and of the state on its way from x to x+.
     substeps : int
     """
 
@@ -24,4 +24,5 @@ class Transition(NamedTuple):
     E: Array
     R: Array
     box: Span
+    within: Span
     substeps: int

@@ -57,6 +57,8 @@ def test_transitions_are_those_of_balls_but_for_rounding(name: str) -> None:
         assert (1.02 * there.R + ROUNDINGS * size >= here.R).all()
         assert (np.abs(here.box.lower - there.box.lower) <= 1e-9 * wide).all()
         assert (np.abs(here.box.upper - there.box.upper) <= 1e-9 * wide).all()
+        assert (np.abs(here.within.lower - there.within.lower) <= 1e-9 * wide).all()
+        assert (np.abs(here.within.upper - there.within.upper) <= 1e-9 * wide).all()
         assert pytest.approx(there.A, rel=1e-9, abs=1e-12) == here.A
     assert undecided < 15
 
@@ -80,11 +82,15 @@ def test_outputs_and_what_readings_leave_of_a_box_are_those_of_balls(name: str) 
         assert pytest.approx(there.C, rel=1e-9, abs=1e-12) == first.C
         assert (first.R <= 1.02 * there.R + 1e-13).all()
         assert (here.R <= first.R).all()
+        again = model.kernel.cut(Span(lower, upper), y, first)
         cut_there = cut(Span(lower, upper), y, there, flow.w, model.noise)
-        if cut_there is not None:
+        assert (again is None) == (cut_there is None)
+        if cut_there is not None and again is not None:
             room = 1e-9 * (upper - lower)
-            assert (left.lower >= cut_there.lower - room).all()
-            assert (left.upper <= cut_there.upper + room).all()
+            for mine, its in zip(again, cut_there, strict=True):
+                assert (np.abs(mine - its) <= room).all()
+            assert (left.lower >= again.lower).all()
+            assert (left.upper <= again.upper).all()
         if (x >= lower).all() and (x <= upper).all() and not flow.varying.any():
             assert (left.lower <= x).all()
             assert (x <= left.upper).all()

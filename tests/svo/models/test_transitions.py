@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from svo.checks import Array
-from svo.models.nonlinear import NonlinearModel, Span, Undecided
+from svo.models.nonlinear import NonlinearModel, Undecided
 from svo.models.nonlinear.simulation import integrated
 from tests.svo.models.nonlinear_plants import CASES, Case, cstr, pendulum, three_tanks
 
@@ -147,8 +147,8 @@ def test_a_state_that_is_pulled_back_is_enclosed_by_its_own_ends() -> None:
         lambda x: [60.0 * (0.5 - x[0]) - x[0] ** 3, x[0] - 0.1 * x[1]], lambda x: x, states=["a", "b"], Ts=0.05,
         largest=([-9, -9], [9, 9]),
     )  # fmt: skip
-    start, h = Span(np.array([0.0, 2.0]), np.array([1.0, 3.0])), model.Ts / 8
-    box, _ = model.flow.enclosure(start, np.zeros(0), h)
+    h = model.Ts / 8
+    box = model.transition([0.0, 2.0], [1.0, 3.0], dt=h).within
     assert box.lower[0] == pytest.approx(0.0, abs=1e-9)
     assert box.upper[0] == pytest.approx(1.0, abs=1e-9)
     x = np.array([[a, b] for a in (0.0, 0.4, 1.0) for b in (2.0, 3.0)])

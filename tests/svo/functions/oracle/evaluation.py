@@ -72,7 +72,8 @@ class Evaluation:
         g[:, own] = np.array([row.g for row in rows]).reshape(len(rows), len(own))
         ends = np.array([[*row.rest, *row.range] for row in rows]).reshape(len(rows), 4).T
         centre = 0.5 * lower[:free] + 0.5 * upper[:free]
-        return Forms(centre, np.array([row.k for row in rows], dtype=float), g, *ends.copy())
+        reach = np.maximum(upper[:free] - centre, centre - lower[:free]) * (1.0 + 2.0**-50)
+        return Forms(centre, reach, np.array([row.k for row in rows], dtype=float), g, *ends.copy())
 
     def check(self, lower: Array, upper: Array) -> None:
         """Raise Unenclosed if a row has no bounded range, whatever the coordinates are whose ends are NaN."""

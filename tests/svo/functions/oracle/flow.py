@@ -75,7 +75,8 @@ class Flow:
 
         A trajectory that keeps to the physical range leaves a box through a face of that range or not at all, if the
         box contains start + [0, h] f(box) in its interior elsewhere: on its first way out it would still have the
-        derivatives of the box. Neither a Lipschitz constant nor uniqueness is needed.
+        derivatives of the box. Neither a Lipschitz constant nor uniqueness is needed. A coordinate that pulls itself
+        back is then enclosed by what its derivative is at its own ends (`_at_faces`).
 
         Raises
         ------
@@ -85,7 +86,7 @@ class Flow:
         box = self._strict(start, u, h)
         forms = self.forms(box, u)
         for _ in range(_PASSES):
-            image = _image(start, Span(forms.lower, forms.upper), h)
+            image = _image(start, _at_faces(start, forms), h)
             narrower = Span(np.maximum(box.lower, image.lower), np.minimum(box.upper, image.upper))
             helps = bool((narrower.width < _WORTHWHILE * box.width).any())
             box, forms = narrower, self.forms(narrower, u)
@@ -110,6 +111,24 @@ class Flow:
         if self.physical is not None:
             low, high = low | (box.lower <= self.physical.lower), high | (box.upper >= self.physical.upper)
         return bool((low & high).all())
+
+
+def _at_faces(start: Span, forms: Forms) -> Span:
+    """What f adds at most to how far each coordinate is from ``start``, in place of bounds over the whole box.
+
+    Where f_i falls with x_i, v = x_i - upper_i has v' <= g_ii v + F, F being the form's bound at x_i = upper_i, and
+    v <= 0 at first: so v(t) <= t max(F, 0), whatever f_i is at a smaller x_i.
+    """
+    n, size = len(start.lower), np.abs(forms.g) @ forms.reach
+    own, middle = np.diagonal(forms.g), forms.centre[:n]
+    others = size - np.abs(own) * forms.reach[:n]
+    lost = (forms.g.shape[1] + 8) * _EPS * (size + np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high))
+    upper = forms.k + own * (start.upper - middle) + others + forms.high + lost
+    lower = forms.k + own * (start.lower - middle) - others + forms.low - lost
+    return Span(
+        np.where(own <= 0.0, np.maximum(lower, forms.lower), forms.lower),
+        np.where(own <= 0.0, np.minimum(upper, forms.upper), forms.upper),
+    )
 
 
 def _image(start: Span, f: Span, h: float) -> Span:

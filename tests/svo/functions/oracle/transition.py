@@ -33,7 +33,7 @@ def transition(flow: Flow, start: Span, u: Array, T: float, least: int = 1) -> T
     """
     n, nw = flow.n, len(flow.varying)
     start = flow.inside(start)
-    here = Transition(np.eye(n), np.zeros(n), np.zeros((n, nw)), np.zeros(n), start, 0)
+    here = Transition(np.eye(n), np.zeros(n), np.zeros((n, nw)), np.zeros(n), start, start, 0)
     done, size, why = 0, _FINEST // least, "the state moves too far for a linear model"
     while done < _FINEST:
         h = T * (size / _FINEST)  # exact: a power of two
@@ -67,7 +67,7 @@ def mapped(flow: Flow, start: Span, u: Array) -> Transition:
     a = k - forms.g @ c
     size = np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high) + np.abs(forms.g) @ (2.0 * np.abs(c))
     R = 0.5 * (forms.high - forms.low) + (len(c) + 8) * _EPS * size + _TINY
-    found = Transition(forms.g[:, :n], a, forms.g[:, n:], R, Span(forms.lower, forms.upper), 1)
+    found = Transition(forms.g[:, :n], a, forms.g[:, n:], R, Span(forms.lower, forms.upper), start, 1)
     return found._replace(box=_newest(flow, found, start, found.box))
 
 
@@ -97,8 +97,16 @@ def _after(flow: Flow, here: Transition, start: Span, box: Span, forms: Forms, h
     terms = P @ (np.abs(here.A) @ start.largest + np.abs(here.a) + np.abs(here.E) @ w.largest)
     R = P @ here.R + lost
     R = R + 2.0 * rounding * (terms + np.abs(step.gain) @ most + R) + _TINY
+    lowest, highest = np.minimum(here.within.lower, box.lower), np.maximum(here.within.upper, box.upper)
+    within = Span(lowest, highest)
     found = Transition(
-        step.move @ here.A, step.move @ here.a + step.gain @ q, step.move @ here.E + E, R, here.box, here.substeps + 1
+        step.move @ here.A,
+        step.move @ here.a + step.gain @ q,
+        step.move @ here.E + E,
+        R,
+        here.box,
+        within,
+        here.substeps + 1,
     )
     end = Span(here.box.lower + h * forms.lower, here.box.upper + h * forms.upper)
     room = 2.0 * _EPS * (box.largest + h * np.maximum(np.abs(forms.lower), np.abs(forms.upper)))
