@@ -7,6 +7,7 @@ the end, so they are taken only where floats cannot decide: flat, thin and unbou
 import numpy as np
 
 from polytopes.errors import UndecidedError
+from polytopes.general_position import WIDE
 from polytopes.integers import Floats, integer_rows, maybe_short, short
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, generators_of
@@ -18,7 +19,6 @@ LONG_RAYS = 500
 _FEW_RAYS = 200
 _LONG_ROWS = 100
 _COORDINATES = 16
-_WIDE = 1e-6  # radius of a largest ball, relative to the size of b, from which rounding is small beside it
 
 
 def exact_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Program) -> ExactGenerators | None:
@@ -59,6 +59,6 @@ def integer_form(A: Floats, b: Floats, C: Floats, d: Floats) -> ExactRows:
 def wide(program: Program) -> bool:
     """Whether floats know the set well: full-dimensional, wide against their rounding, bounded."""
     axes = np.eye(program.flat.dim)
-    if program.flat.pivots or not program.fat or program.interior.radius <= _WIDE * program.size:
+    if program.flat.pivots or not program.fat or program.interior.radius <= WIDE * program.size:
         return False
     return bool(np.isfinite(program.maximise(np.vstack([axes, -axes])).values).all())

@@ -11,6 +11,9 @@ from polytopes.checks import Floats
 from polytopes.kernel import Indices
 from polytopes.linear_program import Program
 
+WIDE = 1e-6
+"""Radius of a largest ball, relative to the size of b, from which rounding is small beside it."""
+
 _MOST = 100_000  # vertices or facets
 _APART = 1e-9  # distance of a vertex from a row, or of a facet from a point, below which it counts as nearly on it
 
@@ -18,9 +21,9 @@ _APART = 1e-9  # distance of a vertex from a row, or of a facet from a point, be
 def simple_vertices(program: Program) -> Floats | None:
     """Vertices (k, n) of a set without equalities, in lexicographic order; None if they are not proven to be all.
 
-    The proof is one that the set is bounded too.
+    The proof is one that the set is bounded too.  Thin sets are left to others.
     """
-    if program.flat.pivots or not program.fat:
+    if program.flat.pivots or not program.fat or program.interior.radius <= WIDE * program.size:
         return None
     d, m = program.AT.shape
     G = np.zeros((d + 1, m + 1))

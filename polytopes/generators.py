@@ -7,7 +7,7 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.exact_generators import integer_form
-from polytopes.hull import nearly_flat, outer_rows, point_offsets
+from polytopes.hull import Spread, outer_rows, point_offsets
 from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, short
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
 from polytopes.outward import float_rows
@@ -71,12 +71,14 @@ def rows_of_generators(V: Floats, rays: Floats) -> Table:
     """
     points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
     directions = integer_rows(rays[rays.any(axis=1)])
-    if short(points) or len(directions) or (len(V) <= _FEW and len(nearly_flat(V, rays))):
+    exact = short(points) or len(directions) > 0
+    spread = None if exact else Spread.of(V)
+    if spread is None or (len(V) <= _FEW and spread.rank < V.shape[1]):
         found = ExactGenerators(distinct(points), distinct(directions), directions[:0])
         try:
             return float_rows(found)
         except UndecidedError:
             if len(directions):
                 raise
-    A, b = outer_rows(V, point_offsets(V))
+    A, b = outer_rows(spread or Spread.of(V), point_offsets(V))
     return A, b, np.empty((0, V.shape[1])), np.empty(0)

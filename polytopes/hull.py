@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,50 +23,71 @@ _ALIKE = 1e-6  # distance between two rows below which they may be one facet
 _REACHED = 1e-11  # a facet is final if no point of the set lies this far beyond it (widths are about one)
 
 
-def outer_rows(V: Floats, offsets: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
-    """Rows A, b of a set that contains the one of which the points (k, n) are all vertices, or nearly so.
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """How points (k, n) are spread: `offsets` (k, n) from their mean, over powers of two `scale` (n,), and the widths
+    `sizes` (n,) along the principal `axes` (n, n), widest first; all but the first `rank` are rounding.
+    """
+
+    points: Floats
+    scale: Floats
+    offsets: Floats
+    sizes: Floats
+    axes: Floats
+    rank: int
+
+    @classmethod
+    def of(cls, V: Floats, ahead: Floats | None = None) -> Self:
+        """The spread of points (k, n), and of further ones about their mean."""
+        both = V if ahead is None else np.vstack([V, ahead])
+        scale = axis_scales(both)
+        offsets = (both - V.mean(axis=0)) / scale
+        sizes, axes = principal_axes(offsets)
+        return cls(both, scale, offsets, sizes, axes, numeric_rank(sizes))
+
+    @property
+    def across(self) -> Floats:
+        """Unit normals of the subspace that the points lie in, to within 1e-12 of their spread; none in all of R^n."""
+        return _unit(_divided(self.axes[self.rank :], self.scale))
+
+    def normals(self) -> Floats:
+        """Unit normals of the facets of the points' shadow on that subspace."""
+        rank, sizes = self.rank, self.sizes[: self.rank]
+        if rank == 0:
+            return np.empty((0, self.scale.size))
+        facets = _facets(self.offsets @ self.axes[:rank].T / sizes).normals()
+        return _unit(_divided(facets / sizes @ self.axes[:rank], self.scale))
+
+
+def outer_rows(spread: Spread, offsets: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+    """Rows A, b of a set that contains the one of which some points are all vertices, or nearly so.
 
     The points only tell the normals.  Where they lie within 1e-12 of their spread of a subspace, the set is held in a
     slab about it: the facets are those of the points' shadow on the subspace.
 
     Parameters
     ----------
-    V : array (k, n), k >= 1
+    spread : Spread
+        Of the points.
     offsets : callable
         Upper bounds of the set's supports along normals (m, n).
     """
-    normals, across = hull_normals(V)
-    rows = np.vstack([normals, across, -across])
+    across = spread.across
+    rows = np.vstack([spread.normals(), across, -across])
     return rows, offsets(rows)
 
 
-def hull_normals(V: Floats) -> tuple[Floats, Floats]:
-    """Unit normals of the facets of points (k, n), and of the subspace that they nearly lie in (none, if n wide)."""
-    n = V.shape[1]
-    scale = axis_scales(V)
-    offsets = (V - V.mean(axis=0)) / scale
-    sizes, axes = principal_axes(offsets)
-    rank = numeric_rank(sizes)
-    across = _unit(_divided(axes[rank:], scale))
-    if rank == 0:
-        return np.empty((0, n)), across
-    normals = _facets(offsets @ axes[:rank].T / sizes[:rank]).normals()
-    return _unit(_divided(normals / sizes[:rank] @ axes[:rank], scale)), across
-
-
-def nearly_flat(V: Floats, rays: Floats) -> Floats:
-    """Unit normals of the subspace that points (k, n) and rays (r, n) lie within 1e-12 of their spread of.
+def spread_with(V: Floats, rays: Floats) -> Spread:
+    """The spread of points (k, n) and of rays (r, n).
 
     The rays are taken to be about as long as the points are spread, or, where that is rounding, as they are large.
     """
+    if not len(rays):
+        return Spread.of(V)
     longest = np.abs(rays).max(axis=1, keepdims=True)
     spread, size = np.ptp(V, axis=0).max(), np.abs(V).max()
     spread = (spread if spread > _FLAT * size else size) or 1.0
-    ahead = V.mean(axis=0) + rays / np.where(longest > 0.0, longest, 1.0) * spread
-    both = np.vstack([V, ahead])
-    scale = axis_scales(both)
-    sizes, axes = principal_axes((both - V.mean(axis=0)) / scale)
-    return _unit(_divided(axes[numeric_rank(sizes) :], scale))
+    return Spread.of(V, V.mean(axis=0) + rays / np.where(longest > 0.0, longest, 1.0) * spread)
 
 
 def numeric_rank(sizes: Floats) -> int:
@@ -158,8 +180,11 @@ def _facets(points: Floats) -> _Facets:
     if proven is not None:
         return _Facets(points, *proven, np.arange(len(proven[0])), np.unique(proven[1]), True)
     equations, simplices, corners = point_hull(points)
-    rows, number = np.unique(equations, axis=0, return_inverse=True)
-    return _Facets(points, rows, simplices, number.ravel(), corners)
+    order = np.lexsort(equations.T[::-1])
+    fresh = np.append(True, (np.diff(equations[order], axis=0) != 0.0).any(axis=1))
+    number = np.empty(len(order), np.int64)
+    number[order] = np.cumsum(fresh) - 1
+    return _Facets(points, equations[order[fresh]], simplices, number, corners)
 
 
 def normals_by_supports(oracle: Oracle, inner: Floats) -> Floats:

@@ -5,7 +5,7 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError
 from polytopes.generators import in_integers
-from polytopes.hull import hull_normals
+from polytopes.hull import Spread
 from polytopes.minkowski_weyl import total
 from polytopes.outer_supports import upper_supports
 from polytopes.outward import float_rows
@@ -52,7 +52,8 @@ def _normals(P: Rows, Q: Rows) -> Floats:
     except ProjectionLimitError:
         pass
     sums = vertices(P)[:, None, :] + vertices(Q)
-    facets, across = hull_normals(sums.reshape(-1, n))
+    spread = Spread.of(sums.reshape(-1, n))
+    facets, across = spread.normals(), spread.across
     return np.vstack([facets, across, -across])
 
 

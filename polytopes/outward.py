@@ -11,7 +11,7 @@ from flint import fmpq_mat, fmpz_mat
 
 from polytopes.checks import Floats
 from polytopes.double_description import Integers, null_space, primitive
-from polytopes.hull import nearly_flat
+from polytopes.hull import spread_with
 from polytopes.integers import are_floats, as_floats, floats_of_directions, floats_of_points, integer_rows
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, rows_of, shadow, stacked
 from polytopes.outward_normals import OutwardNormals
@@ -30,7 +30,7 @@ def float_rows(generators: ExactGenerators) -> Table:
     equalities = _short_basis(rows.equalities)
     if not all(are_floats(row[:-1]) for row in [*equalities, *rows.inequalities.tolist()]):
         directions = floats_of_directions(stacked(generators.rays, generators.lines))
-        across = nearly_flat(floats_of_points(generators.vertices), directions)
+        across = spread_with(floats_of_points(generators.vertices), directions).across
         if generators.dim - len(across) < generators.affine_dim:
             return _slab(generators, across)
     return _near_rows(generators, rows.inequalities, equalities)

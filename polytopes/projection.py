@@ -27,7 +27,7 @@ from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
 from polytopes.exact_generators import few_generators
 from polytopes.fourier_motzkin import eliminate
-from polytopes.hull import normals_by_supports, outer_rows
+from polytopes.hull import Spread, normals_by_supports, outer_rows
 from polytopes.minkowski_weyl import shadow
 from polytopes.outer_supports import upper_supports
 from polytopes.outer_template import outer_template
@@ -113,7 +113,7 @@ def _project_body(P: Rows, k: int, inner: Floats, method: str, max_rows: int, ou
     if method == "auto":
         return _project_automatically(P, k, inner, max_rows, outer)
     if method == "vertices":
-        return outer_rows(vertices(P)[:, :k], lambda normals: upper_supports(P, _lifted(normals, P.dim)))
+        return outer_rows(Spread.of(vertices(P)[:, :k]), lambda normals: upper_supports(P, _lifted(normals, P.dim)))
     if method == "convex-hull":
         normals = normals_by_supports(lambda directions: _shadow_points(P, directions), inner[:k])
         bounds = upper_supports(P, _lifted(normals, P.dim))

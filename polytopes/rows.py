@@ -11,6 +11,8 @@ from polytopes.checks import Floats, real_array
 from polytopes.derived import derived
 from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
+from polytopes.general_position import simple_vertices
+from polytopes.integers import maybe_short
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.preparation import prepare
@@ -94,6 +96,11 @@ class Rows(Value):
     def exact(self) -> ExactGenerators | None:
         """The generators in integers, where the set is computed with in integers; see `exact_generators`."""
         return exact_generators(self.A, self.b, self.C, self.d, self.program)
+
+    @derived
+    def simple(self) -> Floats | None:
+        """The vertices (k, n) of a set in general position whose rows are not short; see `general_position`."""
+        return None if maybe_short(self.A, self.b) else simple_vertices(self.program)
 
     def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
         """The same equalities with other inequalities ``A x <= b``: A (m, n), b (m,)."""

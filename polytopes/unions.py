@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from polytopes.checks import Floats, listed, real_array
 from polytopes.generators import in_integers
 from polytopes.hpolytope import HPolytope
-from polytopes.hull import outer_rows
+from polytopes.hull import Spread, outer_rows
 from polytopes.minkowski_weyl import union
 from polytopes.outer_supports import upper_supports
 from polytopes.outward import float_rows
@@ -43,10 +43,16 @@ def _hull_rows(sets: Sequence[Rows]) -> Table:
         return nothing(n)
     if len(some) == 1:
         return some[0].A, some[0].b, some[0].C, some[0].d
-    if all(P.exact is not None for P in some) or not all(is_bounded(P) for P in some):
+    if not all(P.simple is not None for P in some) and (
+        all(P.exact is not None for P in some) or not all(is_bounded(P) for P in some)
+    ):
         return float_rows(union([in_integers(P) for P in some]))
     points = np.vstack([vertices(P) for P in some])
-    return *outer_rows(points, lambda normals: _largest_supports(some, normals)), np.empty((0, n)), np.empty(0)
+    return (
+        *outer_rows(Spread.of(points), lambda normals: _largest_supports(some, normals)),
+        np.empty((0, n)),
+        np.empty(0),
+    )
 
 
 def _largest_supports(sets: Sequence[Rows], normals: Floats) -> Floats:

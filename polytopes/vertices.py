@@ -11,8 +11,7 @@ from polytopes.affine_hull import explicit
 from polytopes.checks import Floats
 from polytopes.errors import UnboundedError, UndecidedError
 from polytopes.frame import UnitBody, unit_body
-from polytopes.general_position import simple_vertices
-from polytopes.integers import floats_of_points, maybe_short
+from polytopes.integers import floats_of_points
 from polytopes.qhull import dual_hull
 from polytopes.redundancy import facets
 from polytopes.rows import Rows
@@ -34,9 +33,8 @@ def vertices(P: Rows) -> Floats:
     """
     if not known_nonempty(P):
         return np.empty((0, P.dim))
-    found = None if maybe_short(P.A, P.b) else simple_vertices(P.program)
-    if found is not None:
-        return found
+    if P.simple is not None:
+        return P.simple.copy()
     if not is_bounded(P):
         raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
     if P.exact is not None:

@@ -7,10 +7,11 @@ from polytopes.affine_hull import affine_dim
 from polytopes.errors import UndecidedError
 from polytopes.exact import to_floats
 from polytopes.frame import unit_body
+from polytopes.hull import Spread
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.qhull import points_volume
 from polytopes.rows import Rows
-from polytopes.support import is_bounded
+from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import listed, vertices
 
 
@@ -22,6 +23,10 @@ def volume(P: Rows) -> float:
     UndecidedError
         If the set is too thin for such coordinates, and not computed with in integers.
     """
+    if known_nonempty(P) and P.dim > 1 and P.simple is not None:
+        spread = Spread.of(P.simple)
+        points = spread.offsets @ spread.axes.T / spread.sizes
+        return float(points_volume(points) * np.prod(spread.sizes) * np.prod(spread.scale))
     if affine_dim(P) < P.dim:
         return 0.0
     if not is_bounded(P):

@@ -14,6 +14,7 @@
 enum { UNPROVEN = -1, TOO_MANY_RAYS = -2 };
 
 static const double NEAR = 1e-3;       /* of the unit matrix that an inverse may miss */
+enum { STEPS = 4 };
 static const double DEPENDENT = 1e-13; /* pivot, of rows of length about one */
 
 typedef struct {
@@ -231,20 +232,28 @@ static int first_ray(Cone *cone, const double *inner, integer *rows, double *ray
     return 1;
 }
 
-/* A point x (d - 1,) that rows a'x <= b, given as (a, -b), meet in: one Newton step in twice the precision. */
+/* A point x (d - 1,) that rows a'x <= b, given as (a, -b), meet in: Newton steps with residuals in twice the precision. */
 static void to_point(const Cone *cone, const integer *rows, double *ray)
 {
     const integer d = cone->d;
     double *step = cone->total;
     for (integer j = 0; j < d - 1; j++) ray[j] /= ray[d - 1];
     ray[d - 1] = 1.0;
-    fill(step, 0.0, d);
-    for (integer k = 0; k < d - 1; k++) {
-        Sum value = {0.0, 0.0, 0.0};
-        for (integer j = 0; j < d; j++) add_product(&value, cone->at[j * cone->m + rows[k]], ray[j]);
-        add_multiple(step, value.total + value.lost, cone->inverse + k * d, d);
+    for (int turn = 0; turn < STEPS; turn++) {
+        fill(step, 0.0, d);
+        for (integer k = 0; k < d - 1; k++) {
+            Sum value = {0.0, 0.0, 0.0};
+            for (integer j = 0; j < d; j++) add_product(&value, cone->at[j * cone->m + rows[k]], ray[j]);
+            add_multiple(step, value.total + value.lost, cone->inverse + k * d, d);
+        }
+        double moved = 0.0, size = 0.0;
+        for (integer j = 0; j < d - 1; j++) {
+            const double part = step[j] - step[d - 1] * ray[j];
+            ray[j] -= part;
+            moved = larger(moved, fabs(part)), size = larger(size, fabs(ray[j]));
+        }
+        if (moved <= 1e3 * EPS * size) return; /* what is left of it is rounding */
     }
-    for (integer j = 0; j < d - 1; j++) ray[j] -= step[j] - step[d - 1] * ray[j];
 }
 
 /* Rays of a cone: their number, or why there is no answer.
