@@ -10,23 +10,24 @@ from numpy.typing import ArrayLike
 
 from polytopes import motion, projection, reduction, slicing
 from polytopes import support as support_functions
-from polytopes.affine_hull import hull_of
+from polytopes.affine_hull import hull_of, made_explicit
 from polytopes.affine_image import affine_image
 from polytopes.checks import different_coordinates, real_array, real_number, whole_number
 from polytopes.intersection import rows_of_both
 from polytopes.minkowski_sum import minkowski_sum
 from polytopes.normalisation import normalised
 from polytopes.outer_template import outer_template
+from polytopes.polar import polar
 from polytopes.pontryagin_difference import pontryagin_difference
 from polytopes.preimage import preimage
 from polytopes.product import product
-from polytopes.questions import Questions
-from polytopes.redundancy import minimal_rows
+from polytopes.redundancy import kept_rows, minimal_rows
 from polytopes.rows import Rows, a_set, dense, nothing, same_space
+from polytopes.shape import Shape
 from polytopes.signatures import options_by_name
 
 
-class Constructions(Questions):
+class Constructions(Shape):
     """Sets made from a set."""
 
     def remove_redundancy(self) -> Self:
@@ -44,6 +45,28 @@ class Constructions(Questions):
     def intersection(self, Q: Rows) -> Self:
         """Points in both this set and Q: the rows of both, redundant ones too."""
         return type(self)(*rows_of_both(self, same_space(self, Q)))
+
+    def facets(self) -> list[Self]:
+        """The facets, as sets: for each row of a minimal description, the set where it holds with equality.
+
+        None of the empty set or an affine set; of a segment its ends.
+        """
+        if not support_functions.known_nonempty(self):
+            return []
+        return [type(self)(*made_explicit(self, [i]).table) for i in kept_rows(self).inequalities.tolist()]
+
+    def polar(self) -> Self:
+        """``{y : x'y <= 1 for all x in P}``: exact where its rows are floats, else outward.
+
+        The whole space if P is empty.  Its own polar is the closure of the hull of P and the origin: P itself, if the
+        origin is inside.
+
+        Raises
+        ------
+        UndecidedError
+            If the double description passes 10 000 rays.
+        """
+        return type(self)(*polar(self))
 
     def translate(self, t: ArrayLike) -> Self:
         """``{x + t : x in P}``, t (n,): exact, right-hand sides that are no floats rounded up."""

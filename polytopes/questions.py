@@ -21,7 +21,6 @@ from polytopes.separation import Intersects
 from polytopes.signatures import options_by_name
 from polytopes.support import Ball, SupportResult
 from polytopes.vertices import vertices
-from polytopes.volume import volume
 
 
 class Questions(Rows):
@@ -246,10 +245,6 @@ class Questions(Rows):
             If it is unbounded and the double description passes 10 000 rays.
         """
         return generators(self)
-
-    def volume(self) -> float:
-        """n-dimensional volume: 0 for flat and empty sets, inf for unbounded full-dimensional ones (as `vertices`)."""
-        return volume(self)
 
     def random_points(self, count: int, rng: np.random.Generator) -> Floats:
         """Points (count, n) of a bounded set, close to uniform: hit-and-run, 20 n steps of O(m n) between two points.

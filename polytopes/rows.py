@@ -63,7 +63,12 @@ class Rows(Value):
             object.__setattr__(self, name, array)
 
     def __reduce__(self) -> tuple[type[Self], Table]:
-        return type(self), (self.A, self.b, self.C, self.d)  # what is derived from them is derived again
+        return type(self), self.table  # what is derived from them is derived again
+
+    @property
+    def table(self) -> Table:
+        """The rows A, b, C, d."""
+        return self.A, self.b, self.C, self.d
 
     @property
     def dim(self) -> int:

@@ -189,6 +189,7 @@ CONSTANTS = (
     Constant("polytopes.hull", "_SLIVER", "heuristic"),
     Constant("polytopes.exact", "_CANCELLING", "heuristic"),
     Constant("polytopes.least_distance", "_STILL", "heuristic"),
+    Constant("polytopes.ellipsoids", "_OPTIMAL", "heuristic"),
     Constant("polytopes.exact_generators", "_WIDE", "heuristic"),
     Constant("polytopes.plotting", "_REACH", "heuristic"),
 )
