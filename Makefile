@@ -21,7 +21,7 @@ export PYTHONDONTWRITEBYTECODE :=
 demo: $(VENV)/.study $(VENV)/.library
 	rm -rf $(STUDY)
 	$(BIN)/svo study eclipse --runs 10 --seed 0 --noise quiet --noise conservative --out $(STUDY)
-	$(BIN)/svo verify $(STUDY)/alarms.jsonl
+	$(BIN)/svo verify $(STUDY)/alarms.jsonl.gz
 	@echo "Open $(STUDY)/report.html in a browser; everything else is beside it."
 
 test: lint

@@ -23,7 +23,7 @@ VERDICT = "verdict.json"
 REPORT, PICTURES = "report.html", "pictures"
 _WATCH = "watch.json"
 _CUT = "alarms.cut"
-_RESULTS = (ALARMS, VERDICT, _WATCH, "study.json", "comparison.csv")
+_RESULTS = (ALARMS, f"{ALARMS}.gz", VERDICT, _WATCH, "study.json", "comparison.csv")
 _FORMAT = "svo-watch-1"
 
 

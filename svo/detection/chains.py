@@ -7,19 +7,53 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-from svo.detection.bank_alarms import bank_of_source, digest_of_alarm
+import numpy as np
+
+from svo.detection.bank_alarms import bank_of_source, digest_of_alarm, promises_of
 from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.models import ModelSample
+from svo.models import ModelSample, UncertainModel
 from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
-from svo.observers.window.chain import promises_of, prover_of, proving, start_of
+from svo.observers.window.certificate import OnWindow, WindowCertificate
+from svo.observers.window.chain import prover_of, proving, start_of
+from svo.observers.window.chain import promises_of as promised
 from svo.observers.window.observer import WindowObserver
+from svo.observers.window.setup import joint_rows
 from svo.plant import BankChoice, MonitoredPlant, with_bank
 from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
+
+
+def _unknowns(alarm: Alarm, model: UncertainModel) -> str | None:
+    """How the bounds of the unknowns in a window's proof are not those of a model: of Delta, and rows on w."""
+    proof = alarm.certificate.about() if isinstance(alarm.certificate, OnWindow) else alarm.certificate
+    if not isinstance(proof, WindowCertificate):
+        return None
+    known = np.array([model.uncertainties[item - 1].bounds for item in proof.owner]).reshape(-1, 2)
+    polytope = model.disturbance_polytope
+    rows = (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0)) if polytope is None else joint_rows(polytope)
+    stated = (proof.w_rows, proof.w_rows_lower, proof.w_rows_upper)
+    if not np.array_equal(proof.delta, known):
+        what = "bounds of Delta are"
+    elif not all(np.array_equal(mine, its) for mine, its in zip(stated, rows, strict=True)):
+        what = "rows on w are"
+    elif proof.sums is not None:
+        what = "bounds of sums are"
+    else:
+        return None
+    return f"the {what} not those of the plant's model {alarm.observer!r}"
+
+
+def _promises(alarm: Alarm, observer: Observer) -> str | None:
+    """How the promises that an alarm rests on are not those of the plant's model; older records state none."""
+    right = promises_of(observer)
+    for name, stated in alarm.premises.items():
+        if name not in right or not all(np.array_equal(a, b) for a, b in zip(stated, right[name], strict=True)):
+            return f"the {name} range is not that of the plant's model {alarm.observer!r}"
+    return None
 
 
 class PlantModels:
@@ -58,9 +92,12 @@ class PlantModels:
         if observer is None:
             return f"the plant's bank has no model {alarm.observer!r:.80}"
         if not isinstance(observer.model, NonlinearModel):
-            different = self._matrices(alarm, observer)
+            different = self._matrices(alarm, observer) or _unknowns(alarm, observer.model)
             if different is not None:
                 return different
+        different = _promises(alarm, observer)
+        if different is not None:
+            return different
         if alarm.model is not None and alarm.model != digest_of_alarm(observer, alarm.certificate):
             return f"the digest is not that of the plant's observer {alarm.observer!r}: it has other options or bounds"
         return None
@@ -138,7 +175,7 @@ def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
     if unproven:
         return False, f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}"
     own = replaced[alarm.observer]
-    again, promises = start_of(own, started), "".join(f" and {promise}" for promise in promises_of(own))
+    again, promises = start_of(own, started), "".join(f" and {promise}" for promise in promised(own))
     if again is not None:
         return True, f"proven over {bounds} bounds, given {again}{promises}"
     if started == 0:

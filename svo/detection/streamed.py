@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from svo.detection.bank_alarms import alarms_at, source_of_bank
+from svo.detection.bank_alarms import KEPT_SCHEDULES, alarms_at, source_of_bank
 from svo.detection.findings import ChangeAt, Findings
 from svo.detection.thresholds import DetectsThresholds
 from svo.interval.on_log import ThresholdDetection
@@ -106,13 +106,14 @@ def detect_streamed(
     asked = isinstance(plant, DetectsThresholds) and plant.has_thresholds
     thresholds = plant.detect_thresholds(joined(list(log.portions()))) if asked else None  # type: ignore[attr-defined]
     bank = on_log(plant, log).bank(noise)
-    outcome, times = Outcome(bank.names), dict[int, float]()
+    outcome, times, schedules = Outcome(bank.names), dict[int, float](), _Schedules()
     for portion, done in follow_portions(bank, plant.scheduler(), log.portions(), outcome):
         times |= _times(outcome, portion, done)
+        schedules.add(outcome, portion, done)
         if progress is not None:
             progress(done, log.samples)
     source = {**source_of_bank(plant), "noise": noise, "log": log.path.name}
-    alarms = alarms_at(outcome, times, source, bank.observers)
+    alarms = alarms_at(outcome, times, source, bank.observers, schedules.of_alarms)
     return StreamedDetection(plant, noise, log, outcome, times, alarms, thresholds)
 
 
@@ -136,6 +137,27 @@ def follow_portions(
         done += len(log) - start
         yield log, done
         before = _last_sample(log)
+
+
+class _Schedules:
+    """Scheduling values of the samples that alarms are about, of those that are still known where they are raised."""
+
+    def __init__(self) -> None:
+        self.of_alarms: dict[int, float] = {}
+        self._recent: dict[int, float] = {}
+
+    def add(self, outcome: Outcome, portion: Log, done: int) -> None:
+        """A portion of the log that ends with sample ``done`` - 1."""
+        if portion.schedule is None or portion.schedule.ndim != 1:
+            return
+        first = done - len(portion)
+        self._recent |= enumerate(portion.schedule.tolist(), start=first)
+        for name, k in outcome.died_at.items():
+            proof = outcome.certificates.get(name)
+            if k is not None and k >= first and proof is not None:
+                about = range(k + 1 - len(proof.samples), k + 1)
+                self.of_alarms |= {i: self._recent[i] for i in about if i in self._recent}
+        self._recent = {i: value for i, value in self._recent.items() if i >= done - KEPT_SCHEDULES}
 
 
 def _last_sample(log: Log) -> Log:

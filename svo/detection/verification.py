@@ -20,6 +20,7 @@ from svo.plant.log_file import read_log
 from svo.terminal import line
 
 _SHOWN = 20  # failed checks
+_START, _MODEL = "the set at the start of each window", "that the model in each record is the plant's"
 
 
 @dataclass(frozen=True, repr=False)
@@ -32,10 +33,13 @@ class Verification(Shown):
         What was checked: the file, or the detection.
     checks : tuple of AlarmCheck
         One an alarm, in their order.
+    given : str
+        What was not checked, and is taken as given; empty if each check says what its proof rests on.
     """
 
     about: str
     checks: tuple[AlarmCheck, ...]
+    given: str = ""
 
     @property
     def ok(self) -> bool:
@@ -55,7 +59,8 @@ class Verification(Shown):
         seconds = sum(check.seconds for check in self.checks)
         proven = f"{self.proven} of {len(self.checks)} alarms proven in exact arithmetic"
         left_out = any(check.ok and NOT_CHECKED in check.reason for check in self.checks)
-        return f"{self.about}: {proven}, in {seconds:.2f} s" + (f" ({NOT_CHECKED})" if left_out else "")
+        given = f", given {self.given}" if self.given and self.proven else ""
+        return f"{self.about}: {proven}, in {seconds:.2f} s{given}" + (f" ({NOT_CHECKED})" if left_out else "")
 
     @property
     def failures(self) -> list[str]:
@@ -133,7 +138,7 @@ def verify(
     models = PlantModels(alarms.plant, alarms.log)
     checks = [check_alarm(alarm, alarms.log, models.difference) for alarm in alarms.alarms]
     about = f"alarms of {alarms.log.source or 'the log'}"
-    return Verification(about, _completed(checks, alarms.alarms, models, full))
+    return Verification(about, _completed(checks, alarms.alarms, models, full), "" if full else _START)
 
 
 def _verified_file(path: Path, log: Log | str | Path | None, full: bool, plant: MonitoredPlant | None) -> Verification:
@@ -141,12 +146,13 @@ def _verified_file(path: Path, log: Log | str | Path | None, full: bool, plant: 
         raise ValueError("full is True and there is no log; give the log that the alarms are of")
     alarms = [] if log is None else _of_one_run(path)
     if log is None or not alarms:
-        return Verification(str(path), tuple(verify_alarms(path)))
+        return Verification(str(path), tuple(verify_alarms(path)), f"{_START}, and {_MODEL}")
     # A description lies beside the alarms, where `Detection.save` put it.
     found = plant or find_plant(str(alarms[0].source.get("plant")), path.parent)
     data = log if isinstance(log, Log) else read_log(log, found)
     models = PlantModels(found, data)
-    return Verification(str(path), _completed(verify_alarms(path, data, models.difference), alarms, models, full))
+    checks = _completed(verify_alarms(path, data, models.difference), alarms, models, full)
+    return Verification(str(path), checks, "" if full else _START)
 
 
 def _completed(

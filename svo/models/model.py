@@ -151,6 +151,11 @@ class UncertainModel(Shown):
         return bool(self._stack.scheduled) or self._bounds.scheduled
 
     @property
+    def stack_table(self) -> ScheduleTable | None:
+        """The stack over a scalar schedule, where all that is scheduled in it are tables over the same points."""
+        return self._stack.table
+
+    @property
     def uses_input_in_output(self) -> bool:
         """Whether y(k) depends on u(k), so that a step needs ``u_next``."""
         return may_be_nonzero(self.D, *(u.D for u in self.uncertainties))

@@ -31,8 +31,8 @@ class Certificate(Shown, ABC):
     """Proof that a model does not explain some data: a frozen dataclass of all that the proof needs.
 
     A kind of its own defines `verify` and `premise`, and has `samples`. To be stored with alarms it stands in
-    `svo.isolation.alarms.KINDS`; fields that are arrays, numbers, polytopes, dataclasses or tuples of them are then
-    written and read without further code.
+    `svo.observers.proof_record.KINDS`; fields that are arrays, numbers, polytopes, dataclasses or tuples of them
+    are then written and read without further code.
 
     Attributes
     ----------

@@ -23,6 +23,7 @@ from svo.observers.polytope.certificate import (
 )
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import ArrivalSet, WindowSample
+from svo.observers.window.left_out import with_channels
 from svo.observers.zonotope.certificate import ZonotopeCertificate
 from svo.observers.zonotope.zonotope import ConstrainedZonotope
 
@@ -46,7 +47,8 @@ def window_out(c: WindowCertificate, form: NormalForm) -> WindowCertificate:
         rows=c.arrival.rows / form.x,
     )
     samples = tuple(_sample_out(s, form) for s in c.samples)
-    return replace(c, arrival=arrival, samples=samples, w_rows=c.w_rows / form.w, units=form.exponents)
+    out = replace(c, arrival=arrival, samples=samples, w_rows=c.w_rows / form.w, units=form.exponents)
+    return with_channels(out)
 
 
 def _sample_out(s: WindowSample, form: NormalForm) -> WindowSample:

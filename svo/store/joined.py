@@ -1,4 +1,6 @@
-"""One text file of the runs' own files of lines, joined when all runs are done, and taken apart to go on.
+"""One packed file of the runs' own, joined when all runs are done, and taken apart to go on.
+
+Each run's file is a gzip member, so that the joined one is read as any other packed file.
 
 Beside it stands its SHA-256 in the form of ``sha256sum``. A file without its digest is somebody else's: it is never
 read, overwritten or removed.
@@ -11,6 +13,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
+from svo.store.packed_lines import members_of
 from svo.store.parts import part_name
 from svo.store.whole import digest_of, write_text, write_whole
 
@@ -24,8 +27,8 @@ class Joined:
     path : Path
     folder : Path
         Of the runs' files.
-    run_of : function of a line
-        The run that a line of the joined file is from.
+    run_of : function of what a member unpacks to
+        The run that it is from.
     """
 
     path: Path
@@ -33,7 +36,7 @@ class Joined:
     run_of: Callable[[bytes], int]
 
     def part(self, run: int) -> Path:
-        return self.folder / f"{part_name(run)}{self.path.suffix}"
+        return self.folder / f"{part_name(run)}{''.join(self.path.suffixes)}"
 
     def is_own(self) -> bool:
         """Whether the joined file is there, as it was written."""
@@ -78,13 +81,12 @@ class Joined:
             self.folder.rmdir()
 
     def take_apart(self, digests: Mapping[int, str]) -> None:
-        """Give each run its own file back and remove the joined one; lines of other runs are dropped."""
+        """Give each run its own file back and remove the joined one; those of other runs are dropped."""
         if not self.is_own():
             return
-        with self.path.open("rb") as file:
-            for run, lines in groupby(file, self.run_of):
-                if run in digests:
-                    _write_bytes(self.part(run), b"".join(lines))
+        for run, members in groupby(members_of(self.path), lambda member: self.run_of(member[1])):
+            if run in digests:
+                _write_bytes(self.part(run), b"".join(raw for raw, _ in members))
         self.path.unlink()
 
     def _concatenate(self, runs: list[int], target: Path) -> None:
@@ -96,7 +98,7 @@ class Joined:
 
     @property
     def _digest(self) -> Path:
-        return self.path.with_suffix(".sha256")
+        return self.path.with_name(self.path.name.partition(".")[0] + ".sha256")
 
 
 def _write_bytes(path: Path, content: bytes) -> None:

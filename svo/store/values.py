@@ -60,7 +60,7 @@ def decode_integer(value: Any) -> int:
 def decode_array(value: Any) -> Array:
     """A float array that `encode_value` wrote."""
     check_keys(value, {"shape", "hex"})
-    shape = tuple(decode_integer(length) for length in _list(value["shape"]))
+    shape = tuple(decode_integer(length) for length in decode_list(value["shape"]))
     text = value["hex"]
     words = text.split(" ") if text else []
     decode = float.fromhex if _FLOATS.fullmatch(text) else decode_float  # which names the first word that is none
@@ -69,7 +69,7 @@ def decode_array(value: Any) -> Array:
 
 def decode_integers(value: Any) -> NDArray[np.int64]:
     """An array (k,) of integers that `encode_value` wrote."""
-    return np.array([decode_integer(item) for item in _list(value)], dtype=np.int64)
+    return np.array([decode_integer(item) for item in decode_list(value)], dtype=np.int64)
 
 
 def decode_arrays(record: Any, names: set[str]) -> dict[str, Array]:
@@ -99,10 +99,21 @@ def decode_value(kind: Any, record: Any) -> Any:
     if decode is not None:
         return decode(record)
     if get_origin(kind) is tuple:
-        return tuple(decode_value(get_args(kind)[0], item) for item in _list(record))
+        return tuple(decode_value(get_args(kind)[0], item) for item in decode_list(record))
+    return kind(**decode_fields(kind, record))
+
+
+def decode_fields(
+    kind: Any, record: Any, others: set[str] | frozenset[str] = frozenset(), *, absent: set[str] | None = None
+) -> dict[str, Any]:
+    """The fields of a dataclass of this type but for ``others``, which the record has in another form.
+
+    Those that are ``absent`` stand elsewhere.
+    """
     kinds, optional = _fields(kind)
-    check_keys(record, kinds.keys() - (optional - record.keys() if isinstance(record, Mapping) else set()))
-    return kind(**{name: decode_value(kinds[name], value) for name, value in record.items()})
+    names = kinds.keys() - (absent or set())
+    check_keys(record, names - (optional - record.keys() if isinstance(record, Mapping) else set()))
+    return {name: decode_value(kinds[name], value) for name, value in record.items() if name not in others}
 
 
 def _decode_truth(value: Any) -> bool:
@@ -137,7 +148,8 @@ def check_keys(record: Any, names: set[str]) -> None:
         raise ValueError(f"entries {_short(', '.join(wrong))} are missing or not of the format")
 
 
-def _list(value: Any) -> list[Any]:
+def decode_list(value: Any) -> list[Any]:
+    """A list, or a TypeError."""
     if not isinstance(value, list):
         raise TypeError(f"expected a list, found {_short(value)}")
     return value

@@ -56,7 +56,7 @@ class StudyStore(Generic[Row]):
 
     @property
     def alarms(self) -> Path:
-        return self.path / "alarms.jsonl"
+        return self.path / "alarms.jsonl.gz"
 
     def check(self, configuration: StudyConfiguration, resume: bool) -> list[str]:
         """Raise an error if the study cannot be run into this folder; returns what a user should know about it.
@@ -65,8 +65,8 @@ class StudyStore(Generic[Row]):
         ------
         ValueError
             If the folder is not empty and ``resume`` is False, holds something else than this very study
-            (configuration and versions of the software), another process is at work in it, or its ``alarms.jsonl``
-            is not what the study wrote.
+            (configuration and versions of the software), another process is at work in it, or its
+            ``alarms.jsonl.gz`` is not what the study wrote.
         """
         if not self.path.is_dir():
             return []
@@ -131,7 +131,7 @@ class StudyStore(Generic[Row]):
         self._parts(_identity(configuration)).write(job.run, rows, digests, metadata)
 
     def join_alarms(self) -> None:
-        """Make one ``alarms.jsonl`` of the runs' alarms, in the order of the runs; errors as `check`."""
+        """Make one ``alarms.jsonl.gz`` of the runs' alarms, in the order of the runs; errors as `check`."""
         self._joined.join(_digests(self._survey().intact, ALARMS))
 
     def rows(self, without_damaged: bool = False) -> list[Row]:
@@ -195,7 +195,7 @@ class StudyStore(Generic[Row]):
 
     @property
     def _joined(self) -> Joined:
-        return Joined(self.alarms, self.path / "alarms", lambda line: int(json.loads(line)["source"]["run"]))
+        return Joined(self.alarms, self.path / "alarms", _run_of)
 
     @property
     def _identity(self) -> Path:
@@ -242,6 +242,11 @@ def expect_one_way(resume: bool) -> None:
 
 def _identity(configuration: StudyConfiguration, runs: int | None = None) -> Identity:
     return Identity(FORMAT, configuration.to_dict(), versions(), runs)
+
+
+def _run_of(records: bytes) -> int:
+    """The run that the alarms of a part are from."""
+    return int(json.loads(records.partition(b"\n")[0])["source"]["run"])
 
 
 def _digests(seals: Mapping[int, Any], kind: str) -> dict[int, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.detection.bank_alarms import alarm_of, source_of_bank
+from svo.detection.bank_alarms import KEPT_SCHEDULES, alarm_of, source_of_bank
 from svo.detection.watch.lines import Line, Notice
 from svo.detection.watch.rows import RowReader
 from svo.detection.watch.timeline import Event, Row, Timeline
@@ -123,6 +124,7 @@ class Session:
         """The first sample comes next."""
         self._bank = self.plant.bank(self.noise)
         self._scheduler = self.plant.scheduler()
+        self._schedules: deque[Any] = deque(maxlen=KEPT_SCHEDULES)
         self._held: Array | None = None
         self._time = 0.0
         self._verdict: Verdict | None = None
@@ -205,6 +207,8 @@ class Session:
         arrays |= {f"schedule.{name}": value for name, value in saved_schedule(self._scheduler).items()}
         if self._held is not None:
             arrays["held"] = self._held
+        if all(isinstance(value, float) for value in self._schedules):
+            arrays["schedules"] = np.array(self._schedules, dtype=np.float64)
         totals = {"samples": self._samples, "undecided": self._undecided, "seconds": self._seconds}
         rest = {"header": self._reader.state(), "timeline": self._timeline.state(), "counts": asdict(self.counts)}
         return arrays, {**totals, **rest, "time": self._time, "dead": self._dead}
@@ -220,6 +224,7 @@ class Session:
         self._bank.load_state_dict(_part(arrays, "bank."))
         resume_schedule(self._scheduler, _part(arrays, "schedule."))
         self._held = arrays.get("held")
+        self._schedules.extend(arrays.get("schedules", np.zeros(0)).tolist())
         self._samples, self._undecided = int(rest["samples"]), int(rest["undecided"])
         self._seconds, self._time = float(rest["seconds"]), float(rest["time"])
         self._dead = {str(name): float(time) for name, time in rest["dead"].items()}
@@ -274,6 +279,7 @@ class Session:
     def _sample(self, time: float, u: Array, y: Array, missing: bool) -> list[Alarm]:
         begun = perf_counter()
         schedule = schedule_of(self._scheduler, y, u)
+        self._schedules.append(schedule)
         verdict = advance(self._bank, self._held, y, u, schedule)
         self._held, self._time, self._verdict = u, time, verdict
         self._samples += 1
@@ -292,8 +298,9 @@ class Session:
         for name in (*self.names, GLOBAL):
             step = verdict.steps.get(name)
             if step is not None and step.certificate is not None and name not in alive and name not in self._dead:
-                observer = self._bank.observers[name]
-                new.append(alarm_of(name, verdict.sample, self._time, step.certificate, origin, observer))
+                proof, observer = step.certificate, self._bank.observers[name]
+                values = list(self._schedules)[-len(proof.samples) :]
+                new.append(alarm_of(name, verdict.sample, self._time, proof, origin, observer, values))
         self._dead |= {alarm.observer: alarm.time for alarm in new}
         return new
 

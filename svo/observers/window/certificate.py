@@ -20,9 +20,12 @@ from svo.logs.log import Log
 from svo.models import Exponents, ModelSample, power
 from svo.observers.certificate import Certificate, started_again
 from svo.observers.free_start import Reading, state_bounds
-from svo.observers.window.evidence import ArrivalSet, WindowEvidence, WindowSample
+from svo.observers.window.evidence import ArrivalSet, SumRows, WindowEvidence, WindowSample
 from svo.observers.window.weak_duality import DualSum, NoProof
 from svo.observers.window_kernel import BASE, TIME, Sizes
+
+_BITS = 53  # of a float
+_MOST_WORK = 2e10  # products of bits: a second or so; the longest windows of 200 samples take a hundredth
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,22 +97,22 @@ class OnWindow(Certificate):
     """A proof that rests on that of a window: it is about the same samples, under the same premise."""
 
     @abstractmethod
-    def _window(self) -> WindowCertificate:
+    def about(self) -> WindowCertificate:
         """The proof that this one rests on."""
 
     @property
     def samples(self) -> tuple[WindowSample, ...]:
         """Model and data of the window."""
-        return self._window().samples
+        return self.about().samples
 
     def premise(self, sample: int) -> str:
-        return self._window().premise(sample)
+        return self.about().premise(sample)
 
     def model_data(self) -> tuple[ModelSample, ...]:
-        return self._window().model_data()
+        return self.about().model_data()
 
     def difference(self, last: int, log: Log) -> str | None:
-        return self._window().difference(last, log)
+        return self.about().difference(last, log)
 
 
 def _with_known_start(c: WindowCertificate) -> Iterator[WindowCertificate]:
@@ -163,6 +166,10 @@ def _is_well_formed(c: WindowCertificate) -> bool:
         return False
     if c.units is not None and not c.units.are_usable:
         return False
+    if any(s.remainder is not None and not (s.remainder >= 0.0).all() for s in c.samples):
+        return False
+    if not (c.sums is None or _sums_are_within(c, c.sums)) or _work(c) > _MOST_WORK:
+        return False
     return bool(np.all((c.owner > 0) & (c.owner < len(c.samples[0].stack))))
 
 
@@ -170,6 +177,28 @@ def _holds(value: Any, shape: tuple[int, ...], kind: type, bounded: bool) -> boo
     if not (isinstance(value, np.ndarray) and value.dtype == kind and value.shape == shape):
         return False
     return not bounded or bool(np.isfinite(value).all())
+
+
+def _sum_bounds(sums: SumRows) -> list[tuple[Any, bool]]:
+    return [(sums.lower, False), (sums.upper, False), (sums.on_sum, True)]
+
+
+def _sums_are_within(c: WindowCertificate, sums: SumRows) -> bool:
+    """Whether sums are over samples of the window that take part, of columns that there are, with bounds in order."""
+    ny, nw = c.samples[0].y.size, c.samples[0].w_lower.size
+    last = np.where(sums.column < ny, c.last, c.last - (not c.late))
+    inside = (sums.column >= 0) & (sums.column < ny + nw) & (c.first <= sums.first) & (sums.first <= sums.last)
+    return bool((inside & (sums.last <= last) & (sums.lower <= sums.upper)).all())
+
+
+def _work(c: WindowCertificate) -> float:
+    """About how many products of bits the exact sum takes, whose numbers grow with every sample."""
+    bits = work = 0.0
+    for s in reversed(c.samples):
+        exponents = np.frexp(s.stack[s.stack != 0.0])[1]
+        bits += _BITS + (float(exponents.max() - exponents.min()) if exponents.size else 0.0)
+        work += bits * s.stack.size
+    return work
 
 
 def _expected_arrays(c: WindowCertificate) -> Iterator[tuple[Any, tuple[int, ...], type, bool]]:
@@ -193,7 +222,14 @@ def _expected_arrays(c: WindowCertificate) -> Iterator[tuple[Any, tuple[int, ...
     if c.units is not None:
         sizes = (("states", n), ("inputs", nu), ("outputs", ny), ("disturbances", nw))
         yield from ((getattr(c.units, name), (size,), np.int64, True) for name, size in sizes)
+    if c.sums is not None:
+        r = np.size(c.sums.on_sum)
+        yield from ((v, (r,), np.int64, True) for v in (c.sums.column, c.sums.first, c.sums.last))
+        yield from ((v, (r,), real, bounded) for v, bounded in _sum_bounds(c.sums))
     for s in c.samples:
+        yield from ((v, (nq, length), real, True) for v, length in ((s.gain, rows), (s.functional, columns))
+                    if v is not None)
+        yield from ((v, (ny,), real, True) for v in (s.remainder,) if v is not None)
         yield s.stack, (np.size(head.stack) // (rows * columns), rows, columns), real, True
         yield s.u, (nu,), real, True
         yield s.y, (ny,), real, False

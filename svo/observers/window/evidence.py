@@ -57,6 +57,11 @@ class WindowSample(Shown):
         Slope and intercept of the line above Delta s and of the line below it.
     on_output, on_w, on_channel : (ny,), (nh,), (nq, 2)
         Multipliers; positive on an upper bound, negative on a lower one.
+    gain, functional : (nq, n + ny), (nq, n + nu + 1 + nw) or None
+        Factors of the channels: s = functional'(x, u, 1, w), and gain Delta s is added to [x(k+1); y(k)]. A choice:
+        what they leave out of the stack is bounded. None: those that an observer makes in its units.
+    remainder : (ny,) or None
+        Added to the noise, and not averaged in sums: what a linearised output leaves out. None = nothing.
     """
 
     stack: Array
@@ -72,6 +77,34 @@ class WindowSample(Shown):
     on_output: Array
     on_w: Array
     on_channel: Array
+    gain: Array | None = None
+    functional: Array | None = None
+    remainder: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SumRows(Shown):
+    """Rows that are sums over samples: of the noise of an output, or of a disturbance.
+
+    Attributes
+    ----------
+    column : (r,) int
+        The output, or ny + the disturbance.
+    first, last : (r,) int
+        Samples that are summed over, both included, within the window.
+    lower, upper : (r,)
+        Bounds of the sum over all of them. A reading that is missing is taken away with the bound of its noise; slack
+        and remainder of the others are added.
+    on_sum : (r,)
+        Multipliers, as those of single rows.
+    """
+
+    column: NDArray[np.int64]
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    lower: Array
+    upper: Array
+    on_sum: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +135,7 @@ class WindowEvidence(Shown):
     units : Exponents or None
         Of the normal form in which uncertainties are factored into channels; None = the units as they are. A choice:
         what any factors leave out is bounded.
+    sums : SumRows or None
     """
 
     first: int
@@ -118,3 +152,4 @@ class WindowEvidence(Shown):
     samples: tuple[WindowSample, ...]
     largest_at: int | None = None
     units: Exponents | None = None
+    sums: SumRows | None = None

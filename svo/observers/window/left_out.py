@@ -14,7 +14,8 @@ that are floats leave exactly nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from flint import arb, arb_mat, ctx, fmpq
@@ -25,6 +26,8 @@ from svo.checks import Array
 from svo.models import Exponents, power
 from svo.observers.window.evidence import WindowEvidence, WindowSample
 from svo.observers.window_kernel import channel_factors
+
+Evidence = TypeVar("Evidence", bound=WindowEvidence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +47,12 @@ class Factors:
     rest: tuple[tuple[int, int, fmpq], ...]
 
 
-def factors_of(stack: Array, owner: NDArray[np.int64], delta: Array, units: Exponents | None) -> Factors | None:
-    """The channels that an observer makes of a stack in its units; None where floats cannot hold them.
+def channels_of(
+    stack: Array, owner: NDArray[np.int64], delta: Array, units: Exponents | None
+) -> tuple[Array, Array] | None:
+    """Gains and functionals of the channels that an observer makes of a stack in its units.
 
-    Whatever the units, the factors and what they leave out add up to the stack; other units give other factors.
+    Other units give other factors. None where floats cannot hold them.
     """
     normal = stack if units is None else stack * units.factor
     if not np.isfinite(normal).all():
@@ -57,6 +62,30 @@ def factors_of(stack: Array, owner: NDArray[np.int64], delta: Array, units: Expo
         gains, functionals = gains * power(units.rows), functionals * power(-units.columns)
     if not (np.isfinite(gains).all() and np.isfinite(functionals).all()):
         return None
+    return gains, functionals
+
+
+def with_channels(c: Evidence) -> Evidence:
+    """The same proof with the factors of its channels, where floats can hold them."""
+    known: dict[bytes, tuple[Array, Array] | None] = {}
+    samples = []
+    for s in c.samples:
+        key = s.stack[1:].tobytes()
+        if key not in known:
+            known[key] = channels_of(s.stack, c.owner, c.delta, c.units)
+        gain, functional = known[key] or (None, None)
+        samples.append(replace(s, gain=gain, functional=functional))
+    return replace(c, samples=tuple(samples))
+
+
+def factors_of(
+    stack: Array, owner: NDArray[np.int64], delta: Array, channels: tuple[Array, Array]
+) -> Factors | None:
+    """Any channels, and what they leave out: together they add up to the stack.
+
+    None where nothing says how far the Delta of an uncertainty without a channel goes.
+    """
+    gains, functionals = channels
     entries: dict[tuple[int, int], fmpq] = {}
     for item in range(1, len(stack)):
         mine = np.flatnonzero(owner == item)
@@ -68,7 +97,7 @@ def factors_of(stack: Array, owner: NDArray[np.int64], delta: Array, units: Expo
                 if gains[q, i] and functionals[q, j]:
                     rest -= rational(gains[q, i]) * rational(functionals[q, j])
             if rest:
-                if reach is None:  # an uncertainty without a channel: nothing says how far its Delta goes
+                if reach is None:
                     return None
                 entries[i, j] = entries.get((i, j), ZERO) + reach * abs(rest)
     return Factors(gains, functionals, tuple((i, j, value) for (i, j), value in entries.items()))

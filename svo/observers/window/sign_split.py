@@ -75,17 +75,33 @@ class SplitCertificate(OnWindow):
         """As `WindowCertificate.resting_on`, in every cell."""
         return replace(self, cells=tuple(cell.resting_on(largest_at) for cell in self.cells))
 
-    def _window(self) -> WindowCertificate:
+    def about(self) -> WindowCertificate:
         return self.cells[0]
 
 
 def _same_window(a: WindowCertificate, b: WindowCertificate) -> bool:
     own = ("first", "last", "n", "late", "largest_at", "delta", "owner", "w_rows", "w_rows_lower", "w_rows_upper")
     data = ("stack", "u", "y", "noise", "slack", "w_lower", "w_upper")
+    if not (_same_s(a, b) and a.sums is None and b.sums is None):
+        return False
     pairs = [(getattr(a, name), getattr(b, name)) for name in own]
     pairs += [(getattr(a.arrival, name), getattr(b.arrival, name)) for name in ArrivalSet.__dataclass_fields__]
     pairs += [(getattr(s, d), getattr(t, d)) for s, t in zip(a.samples, b.samples, strict=True) for d in data]
     return all(np.array_equal(p, q, equal_nan=np.asarray(p).dtype.kind == "f") for p, q in pairs)
+
+
+def _same_s(a: WindowCertificate, b: WindowCertificate) -> bool:
+    """Whether the s of both are the same functions of the samples, as cells of their signs must be."""
+    units = [None if c.units is None else [getattr(c.units, f).tolist() for f in ("states", "inputs", "outputs", "disturbances")]
+             for c in (a, b)]
+    if units[0] != units[1]:
+        return False
+    for s, t in zip(a.samples, b.samples, strict=True):
+        for name in ("functional", "gain", "remainder"):
+            p, q = getattr(s, name), getattr(t, name)
+            if (p is None) != (q is None) or (p is not None and not np.array_equal(p, q)):
+                return False
+    return True
 
 
 def _cover(lower: Array, upper: Array, boxes: list[tuple[Array, Array]]) -> bool:

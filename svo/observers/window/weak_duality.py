@@ -17,12 +17,17 @@ from flint import fmpq
 
 from polytopes.exact import ZERO, rational
 from svo.checks import Array
-from svo.observers.window.evidence import WindowEvidence, WindowSample
-from svo.observers.window.left_out import Factors, factors_of, left_out
+from svo.observers.window.evidence import SumRows, WindowEvidence, WindowSample
+from svo.observers.window.left_out import Factors, channels_of, factors_of, left_out
 
 
 def _interval_min(coefficient: fmpq, lower: fmpq, upper: fmpq) -> fmpq:
     return coefficient * (lower if coefficient > 0 else upper)
+
+
+def _widening(s: WindowSample, o: int) -> fmpq:
+    """What is added to the noise of an output, at each sample anew."""
+    return rational(s.slack[o]) + (ZERO if s.remainder is None else rational(s.remainder[o]))
 
 
 class NoProof(Exception):
@@ -42,16 +47,19 @@ class DualSum:
         self.c = certificate
         self.objective = objective  # sample of the window and direction of what is subtracted from the rows
         self.total = ZERO  # lower bound of (multiplied rows - multiplied bounds) over the boxes
+        self._summed: dict[tuple[int, int], fmpq] = {}  # multipliers of sums, by sample of the window and column
 
     def gap(self) -> fmpq:
         """Least value of the multiplied rows minus their bounds; positive proves emptiness."""
         c = self.c
         costate = [ZERO] * c.n
         factors = self._factors()
+        if c.sums is not None:
+            self._sums(c.sums)
         rest = left_out(c, factors) if any(of.rest for of in factors) else None
         for index in range(len(c.samples) - 1, -1, -1):
             newest = index == len(c.samples) - 1
-            costate = self._sample(c.samples[index], costate, newest, factors[index], rest[index] if rest else [])
+            costate = self._sample(index, costate, newest, factors[index], rest[index] if rest else [])
             if self.objective is not None and self.objective[0] == index:
                 costate = [p - rational(d) for p, d in zip(costate, self.objective[1], strict=True)]
         for r, multiplier in enumerate(c.on_arrival):
@@ -66,12 +74,14 @@ class DualSum:
 
     def _factors(self) -> list[Factors]:
         """Of every sample; they add up to the uncertainties with what they leave out."""
-        known: dict[bytes, Factors | None] = {}
+        known: dict[tuple[bytes, ...], Factors | None] = {}
         found = []
         for s in self.c.samples:
-            key = s.stack[1:].tobytes()
+            stated = () if s.gain is None or s.functional is None else (s.gain, s.functional)
+            key = tuple(array.tobytes() for array in (s.stack[1:], *stated))
             if key not in known:
-                known[key] = factors_of(s.stack, self.c.owner, self.c.delta, self.c.units)
+                channels = stated or channels_of(s.stack, self.c.owner, self.c.delta, self.c.units)
+                known[key] = factors_of(s.stack, self.c.owner, self.c.delta, channels) if channels else None
             of = known[key]
             if of is None:
                 raise NoProof
@@ -87,8 +97,26 @@ class DualSum:
     def _box(self, coefficient: fmpq, lower: float, upper: float) -> None:
         self.total += _interval_min(coefficient, rational(lower), rational(upper))
 
-    def _sample(self, s: WindowSample, after: list[fmpq], newest: bool, of: Factors, rest: list[fmpq]) -> list[fmpq]:
+    def _sums(self, sums: SumRows) -> None:
+        """Rows that are sums: their bounds count once, and their terms at each sample, as `_sample` finds them."""
+        for i, multiplier in enumerate(sums.on_sum):
+            if not multiplier:
+                continue
+            m, column = rational(multiplier), int(sums.column[i])
+            self._bound(m, sums.lower[i], sums.upper[i])
+            for index in range(int(sums.first[i]) - self.c.first, int(sums.last[i]) - self.c.first + 1):
+                s = self.c.samples[index]
+                ny = s.y.size
+                if column < ny and np.isnan(s.y[column]):  # a term that is not there is at most the noise
+                    self.total -= abs(m) * rational(s.noise[column])
+                    continue
+                if column < ny:
+                    self.total -= m * rational(s.y[column]) + abs(m) * _widening(s, column)
+                self._summed[index, column] = self._summed.get((index, column), ZERO) + m
+
+    def _sample(self, index: int, after: list[fmpq], newest: bool, of: Factors, rest: list[fmpq]) -> list[fmpq]:
         """Account for one sample; ``after`` is the costate of the next state, the result that of this one."""
+        s = self.c.samples[index]
         n, ny, nu = self.c.n, s.y.size, s.u.size
         active = not newest or self.c.late
         # weight of every row of the stack: the next state's costate, then the output multipliers
@@ -97,6 +125,12 @@ class DualSum:
             if multiplier:
                 weight[n + o] = self._output(s, o, rational(multiplier))
         known: list[fmpq] = [ZERO] * s.stack.shape[2]
+        for column in range(ny + s.w_lower.size):
+            m = self._summed.get((index, column))
+            if m is not None and column < ny:
+                weight[n + column] += m
+            elif m is not None:
+                known[n + nu + 1 + column - ny] = m
         self._combine(known, s.stack[0], weight)
         if active:
             self._channels(s, weight, known, of, newest)
@@ -113,7 +147,7 @@ class DualSum:
     def _output(self, s: WindowSample, o: int, m: fmpq) -> fmpq:
         if not np.isfinite(s.y[o]):
             raise NoProof
-        reach = rational(s.noise[o]) + rational(s.slack[o])
+        reach = rational(s.noise[o]) + _widening(s, o)
         self.total -= m * (rational(s.y[o]) + (reach if m > 0 else -reach))
         return m
 

@@ -66,7 +66,7 @@ class ZonotopeCertificate(OnWindow):
         rows = [(known.rows[0], known.upper[0], self.multipliers), *hull]
         return all(proven_support(Z, d, mu) <= rational(h) for d, h, mu in rows)
 
-    def _window(self) -> WindowCertificate:
+    def about(self) -> WindowCertificate:
         return self.window
 
     def _is_well_formed(self) -> bool:

@@ -111,7 +111,7 @@ def test_a_new_digest_does_not_save_a_broken_proof(tmp_path: Path, case: tuple[A
     broken = [
         replace(c, samples=tuple(replace(s, noise=n) for s, n in zip(c.samples, explained, strict=True))),
         replace(c, samples=c.samples[1:]),
-        replace(c, owner=np.array([2, 1])),
+        replace(c, owner=np.array([1, 1])),
         replace(c, delta=10 * c.delta),
         replace(c, samples=tuple(replace(s, on_output=-s.on_output) for s in c.samples)),
     ]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from polytopes import HPolytope
 from svo import ArchitectureI, UncertainModel, Uncertainty, WindowObserver, calibrate, distinguishability
 from svo.logs.drive import drive
-from svo.observers.window.left_out import factors_of
+from svo.observers.window.left_out import channels_of, factors_of
 from svo.observers.window_kernel import channel_count, channel_factors
 from svo.observers.zonotope.observer import ConstrainedZonotopeObserver
 from tests.svo.observers.other_units import Units
@@ -112,7 +112,9 @@ def test_what_channels_leave_out_is_bounded_from_above_and_closely(seed: int) ->
     delta = np.tile([[-0.5, 2.0]], (len(owner), 1))
     stack = np.stack([item, item])
     *_, left, complete = channel_factors(stack, owner, delta)
-    found = factors_of(stack, owner, delta, None)
+    channels = channels_of(stack, owner, delta, None)
+    assert channels is not None
+    found = factors_of(stack, owner, delta, channels)
     assert complete
     assert found is not None
     exact = np.zeros(item.shape)

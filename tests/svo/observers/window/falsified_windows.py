@@ -96,7 +96,8 @@ def arrays_of(c: WindowCertificate) -> list[tuple[str, int | None, np.ndarray]]:
     """Every array of a certificate: its name, the sample that it stands in (-1 the arrival set), its value."""
     own = [(f.name, None, getattr(c, f.name)) for f in fields(c) if isinstance(getattr(c, f.name), np.ndarray)]
     arrival = [(f.name, -1, getattr(c.arrival, f.name)) for f in fields(ArrivalSet)]
-    return own + arrival + [(f.name, k, getattr(s, f.name)) for k, s in enumerate(c.samples) for f in fields(s)]
+    entries = ((f.name, k, getattr(s, f.name)) for k, s in enumerate(c.samples) for f in fields(s))
+    return own + arrival + [entry for entry in entries if entry[2] is not None]
 
 
 def put(c: WindowCertificate, name: str, where: int | None, value: Any) -> WindowCertificate:

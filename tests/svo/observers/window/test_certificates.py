@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from polytopes import HPolytope
 from svo.models.model import UncertainModel, Uncertainty
 from svo.observers.window.certificate import WindowCertificate
-from svo.observers.window.left_out import factors_of
+from svo.observers.window.left_out import channels_of
 from svo.observers.window.observer import WindowObserver
 from tests.svo.observers.window.falsified_windows import (
     arrays_of,
@@ -91,10 +91,13 @@ def test_an_uncertain_output_of_the_newest_sample_is_not_overlooked() -> None:
     certificate = certificate_of_jump(drift(x_row=0.1))
     assert not certificate.late
     stack = drift(x_row=0.1, y_row=2.0).stack()
-    factors = factors_of(stack, certificate.owner, certificate.delta, certificate.units)
-    assert factors is not None
-    s = factors.functionals[:, 0]  # times x
-    forged = sample_changed(certificate, 1, stack=stack, s_lower=0.5 * s, s_upper=1.5 * s)
+    found = channels_of(stack, certificate.owner, certificate.delta, certificate.units)
+    assert found is not None
+    gain, functional = found
+    s = functional[:, 0]  # times x
+    forged = sample_changed(
+        certificate, 1, stack=stack, gain=gain, functional=functional, s_lower=0.5 * s, s_upper=1.5 * s
+    )
     assert judge(forged) == "feasible"
     assert not forged.verify()
     assert not replace(forged, late=True).verify()

@@ -126,7 +126,7 @@ def any_entry(rng: np.random.Generator, c: WindowCertificate, y: np.ndarray) -> 
 
 
 def any_sample_entry(rng: np.random.Generator, s: WindowSample) -> WindowSample:
-    name = str(rng.choice([f.name for f in fields(WindowSample) if f.name != "stack"]))
+    name = str(rng.choice([f.name for f in fields(s) if f.name != "stack" and getattr(s, f.name) is not None]))
     return replace(s, **{name: entry_moved(rng, getattr(s, name))})
 
 
@@ -194,7 +194,8 @@ def test_no_array_may_have_another_shape(seed: int) -> None:
     certificate = some_certificates(seed + 1)[-1][0]
     for name, where, array in arrays_of(certificate):
         longer = np.concatenate([array, array[-1:]]) if len(array) else np.zeros((1, *array.shape[1:]), array.dtype)
-        for value in (longer, array[..., None], array.astype(complex), array.astype(object), array.tolist(), None):
+        wrong = [longer, array[..., None], array.astype(complex), array.astype(object), array.tolist(), None]
+        for value in wrong[: -1 if name in ("gain", "functional") else None]:  # without them it takes its own
             assert put(certificate, name, where, value).verify() is False, (name, where)
         if array.size:
             assert put(certificate, name, where, array[..., :-1]).verify() is False, (name, where)

@@ -18,7 +18,7 @@ from scipy.optimize import linprog
 
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import WindowSample
-from svo.observers.window.left_out import factors_of
+from svo.observers.window.left_out import channels_of
 
 Array = NDArray[np.float64]
 Row = dict[int, Fraction]
@@ -46,7 +46,7 @@ class _System:
         self.size = 2 * self.n + self.nw + self.nq + c.samples[0].y.size
         self.rows: list[TwoSided] = []
         self.boxes: dict[int, tuple[Fraction, Fraction]] = {}
-        self.factors = [_channels(c, s.stack) for s in c.samples]
+        self.factors = [_channels(c, s) for s in c.samples]
         self._arrival()
         for k in range(len(c.samples)):
             self._sample(k)
@@ -236,9 +236,9 @@ def _value(row: Row, point: dict[int, Fraction]) -> Fraction:
     return sum((v * point[j] for j, v in row.items() if v), Fraction(0))
 
 
-def _channels(c: WindowCertificate, stack: Array) -> list[tuple[list[Fraction], list[Fraction]]]:
+def _channels(c: WindowCertificate, s: WindowSample) -> list[tuple[list[Fraction], list[Fraction]]]:
     """(gain, functional) of every channel. Which ones is the observer's choice: `_left_out` bounds what they miss."""
-    found = factors_of(stack, c.owner, c.delta, c.units)
+    found = channels_of(s.stack, c.owner, c.delta, c.units) if s.gain is None else (s.gain, s.functional)
     assert found is not None
-    gains, functionals = ([[Fraction(v) for v in row] for row in m] for m in (found.gains, found.functionals))
+    gains, functionals = ([[Fraction(v) for v in row] for row in m] for m in found)
     return list(zip(gains, functionals, strict=True))
