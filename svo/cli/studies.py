@@ -110,9 +110,9 @@ def study(
 ) -> None:
     """Measure times to detect and to isolate over many simulated runs.
 
-    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl, pictures and report.html. A plant with
-    interval detectors (elevator) is studied with these, each learnt anew in every run. A run that fails is a row with
-    its error; the study goes on, and the exit code is 1.
+    Writes DIR/runs.parquet (a folder of part files), summary.csv, alarms.jsonl.gz, pictures and report.html. A plant
+    with interval detectors (elevator) is studied with these, each learnt anew in every run. A run that fails is a row
+    with its error; the study goes on, and the exit code is 1.
 
     \b
     Example:

@@ -18,8 +18,8 @@ from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
 from svo.observers.window.certificate import OnWindow, WindowCertificate
-from svo.observers.window.chain import prover_of, proving, start_of
 from svo.observers.window.chain import promises_of as promised
+from svo.observers.window.chain import prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
 from svo.observers.window.setup import joint_rows
 from svo.plant import BankChoice, MonitoredPlant, with_bank

@@ -60,7 +60,7 @@ class Verification(Shown):
         proven = f"{self.proven} of {len(self.checks)} alarms proven in exact arithmetic"
         left_out = any(check.ok and NOT_CHECKED in check.reason for check in self.checks)
         given = f", given {self.given}" if self.given and self.proven else ""
-        return f"{self.about}: {proven}, in {seconds:.2f} s{given}" + (f" ({NOT_CHECKED})" if left_out else "")
+        return f"{self.about}: {proven}{given}, in {seconds:.2f} s" + (f" ({NOT_CHECKED})" if left_out else "")
 
     @property
     def failures(self) -> list[str]:

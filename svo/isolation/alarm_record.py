@@ -90,7 +90,7 @@ def read_record(text: str | bytes) -> Alarm:
     try:
         record = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise BadRecord(f"not JSON ({str(error):.80})") from error
+        raise BadRecord(f"not JSON ({error!s:.80})") from error
     known = isinstance(record, dict) and record.get("format") in (FORMAT, BEFORE)
     if not known:
         raise BadRecord(f"not an alarm record of the format {FORMAT} or {BEFORE}")
@@ -145,6 +145,8 @@ def _decode(record: dict[str, Any]) -> Alarm:
     check_keys(record, _ENTRIES | kept_apart | (_OPTIONAL & record.keys()))
     stacks, scheduled = _decode_matrices(record["matrices"]) if kept_apart else (np.zeros(0), None)
     proof = decode_proof(record["kind"], record["certificate"], stacks)
+    if scheduled is not None and len(scheduled.schedule) != len(proof.samples):
+        raise ValueError(f"schedule has {len(scheduled.schedule)} values; expected one for each of its samples")
     dt = decode_array(record["dt"]) if "dt" in record else None
     if dt is not None and not (dt.shape == (len(proof.samples) - 1,) and (dt > 0.0).all() and np.isfinite(dt).all()):
         raise ValueError(f"dt has shape {dt.shape}; expected positive seconds between its {len(proof.samples)} samples")

@@ -1,4 +1,4 @@
-"""Alarms on disk, checked again: records of `svo.isolation.alarm_record`, one a line, in a plain file or in gzip members.
+"""Alarms on disk, checked again: records of `svo.isolation.alarm_record`, one a line, plain or in gzip members.
 
 A record is rejected if its SHA-256 does not match, if the proof does not hold in exact arithmetic, or, given the
 log, if its data are not those of the log. What one proof shows is conditional: a window's on its arrival set and on

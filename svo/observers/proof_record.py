@@ -121,7 +121,9 @@ def _decode_window(record: Any, stacks: Array) -> WindowCertificate:
     record = dict(record)
     samples, every = decode_list(record.get("samples")), record.pop("every_sample", None)
     if len(samples) > _MOST_SAMPLES or len(stacks) not in (1, len(samples)):
-        raise ValueError(f"it has {len(samples)} samples, {len(stacks)} stacks; expected up to {_MOST_SAMPLES}, one each")
+        raise ValueError(
+            f"it has {len(samples)} samples, {len(stacks)} stacks; expected up to {_MOST_SAMPLES}, one each"
+        )
     check_keys(every, _ONCE & set(every))
     once = {name: decode_array(value) for name, value in every.items()}
     parts = decode_fields(WindowCertificate, record, {"samples"})

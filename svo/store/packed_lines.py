@@ -15,6 +15,7 @@ from typing import IO
 LONGEST_LINE = 64 * 2**20
 """Bytes of a line: a longer one is no record."""
 
+_BLANK = b"\n" * 10_000
 _MAGIC = b"\x1f\x8b"
 _CHUNK = 2**16
 _AT_LEAST, _MOST_TIMES = 64 * 2**20, 50  # unpacked bytes: text packs 5 to 20 times, zeros a thousand
@@ -31,22 +32,24 @@ def lines_of(path: str | Path) -> Iterator[bytes]:
     Raises
     ------
     ValueError
-        If a line is longer than `LONGEST_LINE`, a member is damaged or holds nothing, or the file unpacks to more than
-        such files do.
+        If a line is longer than `LONGEST_LINE` or thousands are blank, a member is damaged or holds nothing, or the
+        file unpacks to more than such files do.
     """
-    rest = b""
+    parts: list[bytes] = []  # of the line that has not ended
+    length = 0
     for chunk in _unpacked(path):
-        if b"\n" not in chunk:
-            rest += chunk
-        else:
-            first, *more = chunk.split(b"\n")
-            yield rest + first
-            yield from more[:-1]
-            rest = more[-1]
-        if len(rest) > LONGEST_LINE:
+        if _BLANK in chunk:
+            raise ValueError(f"{path} has {len(_BLANK)} blank lines and more in a row, which no file of records has")
+        *whole, rest = chunk.split(b"\n")
+        for line in whole:
+            yield b"".join([*parts, line])
+            parts, length = [], 0
+        parts.append(rest)
+        length += len(rest)
+        if length > LONGEST_LINE:
             raise ValueError(f"{path} has a line of more than {LONGEST_LINE >> 20} MB, which no record takes")
-    if rest:
-        yield rest
+    if length:
+        yield b"".join(parts)
 
 
 def members_of(path: Path) -> Iterator[tuple[bytes, bytes]]:
@@ -104,4 +107,3 @@ def _chunks(file: IO[bytes], path: str | Path) -> Iterator[bytes]:
             member, produced = zlib.decompressobj(31), 0
     if not member.eof:
         raise ValueError(f"{path} ends within a gzip member; what it holds before that is lost with it")
-

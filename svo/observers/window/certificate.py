@@ -25,7 +25,7 @@ from svo.observers.window.weak_duality import DualSum, NoProof
 from svo.observers.window_kernel import BASE, TIME, Sizes
 
 _BITS = 53  # of a float
-_MOST_WORK = 2e10  # products of bits: a second or so; the longest windows of 200 samples take a hundredth
+_MOST_WORK = 1.5e9  # products of bits: a second; windows of 200 samples of an aircraft take a tenth of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,8 +227,9 @@ def _expected_arrays(c: WindowCertificate) -> Iterator[tuple[Any, tuple[int, ...
         yield from ((v, (r,), np.int64, True) for v in (c.sums.column, c.sums.first, c.sums.last))
         yield from ((v, (r,), real, bounded) for v, bounded in _sum_bounds(c.sums))
     for s in c.samples:
-        yield from ((v, (nq, length), real, True) for v, length in ((s.gain, rows), (s.functional, columns))
-                    if v is not None)
+        yield from (
+            (v, (nq, length), real, True) for v, length in ((s.gain, rows), (s.functional, columns)) if v is not None
+        )
         yield from ((v, (ny,), real, True) for v in (s.remainder,) if v is not None)
         yield s.stack, (np.size(head.stack) // (rows * columns), rows, columns), real, True
         yield s.u, (nu,), real, True

@@ -78,9 +78,7 @@ def with_channels(c: Evidence) -> Evidence:
     return replace(c, samples=tuple(samples))
 
 
-def factors_of(
-    stack: Array, owner: NDArray[np.int64], delta: Array, channels: tuple[Array, Array]
-) -> Factors | None:
+def factors_of(stack: Array, owner: NDArray[np.int64], delta: Array, channels: tuple[Array, Array]) -> Factors | None:
     """Any channels, and what they leave out: together they add up to the stack.
 
     None where nothing says how far the Delta of an uncertainty without a channel goes.

@@ -92,9 +92,9 @@ def _same_window(a: WindowCertificate, b: WindowCertificate) -> bool:
 
 def _same_s(a: WindowCertificate, b: WindowCertificate) -> bool:
     """Whether the s of both are the same functions of the samples, as cells of their signs must be."""
-    units = [None if c.units is None else [getattr(c.units, f).tolist() for f in ("states", "inputs", "outputs", "disturbances")]
-             for c in (a, b)]
-    if units[0] != units[1]:
+    if (a.units is None) != (b.units is None):
+        return False
+    if a.units is not None and b.units is not None and not np.array_equal(a.units.factor, b.units.factor):
         return False
     for s, t in zip(a.samples, b.samples, strict=True):
         for name in ("functional", "gain", "remainder"):

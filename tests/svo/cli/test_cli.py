@@ -290,7 +290,14 @@ def test_a_study_prints_its_table_and_writes_its_files(registered_tank: str, tmp
     assert "Runs with a wrong isolation: 0 of 8" in result.stdout
     assert "about 0.3" in result.stdout
     names = {path.name for path in out.iterdir()}
-    assert names >= {"runs.parquet", "summary.csv", "alarms.jsonl", "report.html", "delays_calm.png", "alive_rough.png"}
+    assert names >= {
+        "runs.parquet",
+        "summary.csv",
+        "alarms.jsonl.gz",
+        "report.html",
+        "delays_calm.png",
+        "alive_rough.png",
+    }
     assert "is not empty; give --resume" in one_line(svo(*command))
     again = json.loads(svo(*command, "--resume", "--json").stdout)
     assert again["configuration"]["runs"] == 2

@@ -95,7 +95,7 @@ def test_detection_into_the_folder_of_a_study_is_refused(registered_tank: str, t
         assert "study.json" in message
     assert content(out) == before
     assert svo(*study, "--resume").exit_code == 0
-    assert (out / "alarms.jsonl").read_bytes() == before["alarms.jsonl"]
+    assert (out / "alarms.jsonl.gz").read_bytes() == before["alarms.jsonl.gz"]
 
 
 def test_a_watch_that_is_started_again_keeps_its_alarms(tmp_path: Path) -> None:

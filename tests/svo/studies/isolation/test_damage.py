@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from svo.cli import app
 from svo.plant import load_plant
 from svo.store import locked
+from svo.store.packed_lines import members_of
 from svo.studies.configuration import StudyConfiguration
 from svo.studies.isolation.figures import write_pictures
 from svo.studies.isolation.run import RunRow
@@ -121,9 +122,9 @@ def test_copies_and_strays_neither_count_nor_break_anything(study: StudyFolder) 
 
 
 def test_alarms_of_another_command_are_never_taken_for_the_studys_own(study: StudyFolder) -> None:
-    every, foreign = study.alarms.read_bytes(), study.alarms.read_bytes().splitlines(keepends=True)[0]
+    every, foreign = study.alarms.read_bytes(), next(members_of(study.alarms))[0]
     study.alarms.write_bytes(foreign)
-    with pytest.raises(ValueError, match=r"alarms\.jsonl is not what this study wrote: .*--resume"):
+    with pytest.raises(ValueError, match=r"alarms\.jsonl\.gz is not what this study wrote: .*--resume"):
         resumed(study)
     answer = run(*STUDY, "--resume", "--out", study.path)
     assert answer.exit_code == 1
