@@ -59,7 +59,8 @@ class Recorder:
         """An operation that a tape has, or its constant."""
         if op is Op.CONSTANT:
             return self.enclosed(values)
-        return self.product(*operands) if op is Op.MUL else self.put(op, *operands)
+        make = {Op.MUL: self.product, Op.DIV: self.quotient}.get(op)
+        return self.put(op, *operands) if make is None else make(*operands)
 
     def product(self, a: Any, b: Any) -> Expression:
         """a b; a square where both are one, and sign(e) sqrt(|e|) as the signed root of e."""
@@ -196,6 +197,15 @@ class Expression:
         return bool(self)
 
     __gt__ = __le__ = __ge__ = __lt__
+
+    def __eq__(self, other: object) -> bool:
+        return bool(self)  # False, silently, would take one branch of an if for all states
+
+    __ne__ = __eq__
+    __hash__ = object.__hash__
+
+    def __repr__(self) -> str:
+        return "<expression>"
 
     def __float__(self) -> float:
         raise TypeError(

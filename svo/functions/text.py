@@ -46,6 +46,8 @@ def parsed(where: str, text: str, recorder: Recorder, symbols: Mapping[str, Expr
     if len(text) > _LONGEST:
         raise ValueError(f"{where} has {len(text)} characters; expected at most {_LONGEST}")
     flat = text.replace("\n", " ").strip()
+    if not flat:
+        raise ValueError(f"{where}: invalid syntax, it is empty; expected an expression, such as 'u - a * h'")
     try:
         tree = ast.parse(flat, mode="eval").body
         return recorder.constant(_Reader(where, flat, recorder, symbols).value(tree))
@@ -78,7 +80,9 @@ class _Reader:
         except (NoValue, TypeError) as error:
             raise self._error(node, str(error)) from None
         shown = f"{ast.unparse(node)!r:.60}"
-        raise self._error(node, f"{shown} is not allowed; expected numbers, symbols, + - * / ** and functions")
+        is_power = isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor)
+        known = "** for a power" if is_power else "numbers, symbols, + - * / ** and functions"
+        raise self._error(node, f"{shown} is not allowed; expected {known}")
 
     def _of(self, value: Any) -> Expression:
         return self.recorder.constant(value)
@@ -96,10 +100,12 @@ class _Reader:
             return self.symbols[node.id]
         if node.id in CONSTANTS:
             return self._of(CONSTANTS[node.id])
+        if node.id in _FUNCTIONS:
+            raise self._error(node, f"unknown symbol {node.id!r}; it is a function: expected {node.id}(...)")
         known = [*self.symbols, *CONSTANTS]
         close = get_close_matches(node.id, known, 1)
         hint = f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(known)}"
-        raise self._error(node, f"unknown symbol {node.id!r}; {hint}")
+        raise self._error(node, f"unknown symbol {node.id!r:.60}; {hint}")
 
     def _binary(self, node: ast.BinOp) -> Expression:
         left = self.value(node.left)
@@ -111,7 +117,9 @@ class _Reader:
     def _call(self, node: ast.Call) -> Expression:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if name not in _FUNCTIONS:
-            raise self._error(node, f"unknown function {name!r:.60}; expected one of {', '.join(_FUNCTIONS)}")
+            close = get_close_matches(name, _FUNCTIONS, 1)
+            hint = f", such as {close[0]}" if close else ""
+            raise self._error(node, f"unknown function {name!r:.60}; expected one of {', '.join(_FUNCTIONS)}{hint}")
         count = _OPERANDS.get(name, 1)
         if node.keywords or len(node.args) != count:
             raise self._error(node, f"{name} takes {count} argument{'s' * (count > 1)}, each an expression")

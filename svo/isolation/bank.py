@@ -473,7 +473,7 @@ class Bank(Shown, ABC):
         if set is not None and physical is not None and not physical.cut(*set.bounding_box())[2]:
             set = None  # no state of it is one of the plant, as nothing has proven yet
         if set is not None:
-            observer.reset(set)
+            observer.restart(set)
             if largest_at is not None:
                 observer.largest_at = largest_at
         elif observer.starts_without_set:

@@ -138,10 +138,15 @@ class Observer(Shown, ABC):
         ------
         TypeError, ValueError
             If the set is no polytope, empty, unbounded or of the wrong dimension, or outside the model's physical
-            range. The observer is unchanged.
+            range, or if the equations of a nonlinear model do not hold or have no value there. The observer is
+            unchanged.
         """
         self._reset(set, *first_box(set, self.model))
         self._forget()
+
+    def restart(self, set: HPolytope) -> None:
+        """As `reset`, from a set that was found while running: what a nonlinear model cannot do there is undecided."""
+        self.reset(set)
 
     def lose_set(self) -> None:
         """Forget all data; nothing is known of the state at the next measurement.

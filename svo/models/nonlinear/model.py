@@ -110,11 +110,14 @@ class NonlinearModel(Value, Shown):
         if not self.states:
             raise ValueError("states is empty; expected at least one name, one a row of f")
         put("Ts", positive_number("Ts", self.Ts, "sampling time in seconds"))
+        expect_kind("continuous", self.continuous, bool, "True or False")
         span = _bounds(self.w, self.disturbances, self.parameters)
         all_names = [*self.states, *self.inputs, *self.disturbances, *self.parameters]
         twice = next((name for name in all_names if all_names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"the name {twice!r} stands for two things; expected states, inputs and so on to differ")
+        if "pi" in all_names and (isinstance(self.f, Mapping) or isinstance(self.h, Mapping)):
+            raise ValueError("the name 'pi' stands for two things, one of them the number; expected another name")
         symbols, n = self.symbols, len(self.states)
         low, high = (end[len(self.disturbances) :] for end in span)
         fixed = np.where(low == high, low, np.nan)
@@ -134,6 +137,8 @@ class NonlinearModel(Value, Shown):
         outputs = written if self.outputs is None else _names("outputs", self.outputs)
         put("reading", traced("h", self.h, symbols, fixed, outputs))
         ny = len(self.reading.outputs)
+        if ny == 0:
+            raise ValueError("h has no rows; expected at least one sensor")
         put("outputs", outputs or tuple(f"y[{i}]" for i in range(ny)))
         noise = np.full(ny, self.n) if np.ndim(self.n) == 0 else self.n
         put("noise", sizes("n", noise, ny))
@@ -341,7 +346,8 @@ class NonlinearModel(Value, Shown):
 
 
 def _names(what: str, given: Any) -> tuple[str, ...]:
-    if isinstance(given, str) or not all(isinstance(name, str) for name in given):
+    is_list = isinstance(given, Sequence) and not isinstance(given, str)
+    if not is_list or not all(isinstance(name, str) for name in given):
         raise TypeError(f"{what} is {given!r:.80}; expected a list of names")
     return tuple(given)
 
@@ -358,6 +364,7 @@ def _bounds(w: Any, disturbances: Sequence[str], parameters: Any) -> Span:
         upper = sizes("w", w, nw)
         lower = -upper
     expect_kind("parameters", parameters, Mapping, "a mapping from names to (lower, upper)")
+    _names("parameters", list(parameters))
     given = {name: (ends, ends) if np.ndim(ends) == 0 else ends for name, ends in parameters.items()}
     ends = [finite_array(f"parameters[{name!r}]", end, (2,)) for name, end in given.items()]
     p = np.array(ends, dtype=float).reshape(-1, 2)
@@ -370,6 +377,7 @@ def _bounds(w: Any, disturbances: Sequence[str], parameters: Any) -> Span:
 
 
 def _varying(varying: Any, disturbances: Sequence[str], parameters: Sequence[str]) -> NDArray[np.bool_]:
+    expect_kind("varying", varying, (str, Sequence), "a name, or a list of names")
     chosen = [varying] if isinstance(varying, str) else list(varying)
     groups = {"all": [*disturbances, *parameters], "w": disturbances, "p": parameters}
     names = {name: [name] for name in groups["all"]}

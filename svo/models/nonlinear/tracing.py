@@ -73,7 +73,10 @@ def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequ
         raise ValueError(f"{what} reads an entry that is not there ({error}); there are {have}") from error
     except (TypeError, ValueError) as error:
         kind = TypeError if isinstance(error, TypeError) else ValueError
-        raise kind(f"{what}: {error}") from error
+        hint = "; expected the functions of svo.functions, not numpy's" if "ufunc" in str(error) else ""
+        raise kind(f"{what}: {error}{hint}") from error
+    except (ArithmeticError, AttributeError, LookupError, NameError, RecursionError) as error:
+        raise ValueError(f"{what} cannot be traced, {type(error).__name__}: {error}") from error
     if names is None:
         found = found if isinstance(found, Iterable) else [found]
         found = list(found)

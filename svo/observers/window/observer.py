@@ -183,6 +183,14 @@ class WindowObserver(Observer):
         again._begin(self._initial)
         return again
 
+    def reset(self, set: HPolytope) -> None:
+        if self._plant is not None:
+            self._plant.model.check_first(*first_box(set, self.model))
+        super().reset(set)
+
+    def restart(self, set: HPolytope) -> None:
+        super().reset(set)
+
     # -- the hooks -------------------------------------------------------------------------------
 
     def _reset(self, set: HPolytope, lower: Array, upper: Array) -> None:

@@ -19,8 +19,9 @@ _RANGES = ("physical", "valid", "largest")
 
 
 def is_nonlinear(top: Table) -> bool:
-    """Whether [model] has equations instead of matrices."""
-    return "dynamics" in top.table("model")
+    """Whether [model] has equations instead of matrices, be it with a key that is mistyped."""
+    model = top.table("model")
+    return "dynamics" in model or ("A" not in model and ("parameters" in top or "outputs" in model))
 
 
 def nonlinear_model_of(top: Table, names: Mapping[str, Sequence[str]]) -> NonlinearModel:

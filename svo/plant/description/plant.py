@@ -21,6 +21,7 @@ from svo.logs.names import Column, Columns
 from svo.models import UncertainModel
 from svo.models.intervals import has_own_intervals
 from svo.models.nonlinear import NonlinearModel
+from svo.observers.first_states import first_box
 from svo.observers.window.observer import WindowObserver
 from svo.plant import no_schedule
 from svo.plant.description.faults import FaultModel, faults_of
@@ -160,6 +161,9 @@ def read_description(path: str | Path) -> DescribedPlant:
         model = model_of(top, {group: found for group, found in names.items() if found})
         faults = faults_of(top, model, names)
     initial = box_of(top.table("initial"), model.n_states)
+    if isinstance(model, NonlinearModel):
+        with top.table("initial").errors():
+            model.check_first(*first_box(initial, model))
     _check_architecture(top, faults)
     dialect = dialect_of(top, columns)
     if dialect is not None and dialect.events:
