@@ -25,11 +25,11 @@ int fdi_interval_applied(integer op, const fdi_interval *a, const fdi_interval *
     case MUL: *value = product(*a, *b); break;
     case SQR: *value = square(*a); break;
     case INV:
-        if (a->low <= 0.0 && 0.0 <= a->high) return DIVIDES_BY_ZERO;
+        if (has_zero(*a)) return DIVIDES_BY_ZERO;
         *value = inverse(*a);
         break;
     case DIV:
-        if (b->low <= 0.0 && 0.0 <= b->high) return DIVIDES_BY_ZERO;
+        if (has_zero(*b)) return DIVIDES_BY_ZERO;
         *value = product(*a, inverse(*b));
         break;
     case SQRT:

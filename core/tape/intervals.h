@@ -40,6 +40,8 @@ static inline int is_bounded(fdi_interval a) { return -INFINITY < a.low && a.low
 
 static inline int is_point(fdi_interval a, double value) { return a.low == value && a.high == value; }
 
+static inline int has_zero(fdi_interval a) { return a.low <= 0.0 && 0.0 <= a.high; }
+
 static inline fdi_interval opposite(fdi_interval a) { return interval(-a.high, -a.low); }
 
 static inline double sum_below(double x, double y) /* exact where a double is: Knuth's two-sum tells what was lost */

@@ -61,6 +61,8 @@ static void take_range(const tape *t, integer i)
                                    t->range + i);
     t->why[i] = BOUNDED;
     if (why != BOUNDED) missing(t, i, why);
+    if (t->op[i] == DIV && t->why[i] == UNKNOWN && t->why[of[1]] == BOUNDED && has_zero(t->range[of[1]]))
+        t->why[i] = DIVIDES_BY_ZERO, t->where[i] = i; /* whatever it divides */
 }
 
 static int are_bounded(const tape *t, int may_be_unknown, refusal *refused)
