@@ -38,7 +38,8 @@ COMMANDS = {
         ("benchmarks.soundness", "--observer", "polytope", "--samples", "10000"),
     ),
     "nonlinear": (
-        ("benchmarks.nonlinear", "--samples", "4800"),
+        ("benchmarks.nonlinear", "--samples", "48000"),
+        ("benchmarks.enclosed_points", "--count", "80"),
         ("benchmarks.tape_operations", "--points", "50000"),
         ("benchmarks.eclipse_banks", "--runs", "3", "--manoeuvres", "2"),
     ),

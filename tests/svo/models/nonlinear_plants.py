@@ -15,7 +15,10 @@ from svo.models.nonlinear import NonlinearModel
 
 @dataclass(frozen=True)
 class Case:
-    """A plant, where it starts, the input at sample k, and what a controller adds to it, if there is one."""
+    """A plant, where it starts, the input at sample k, and what a controller adds to it, if there is one.
+
+    ``normal`` bounds the states of normal operation: beyond it a run has run away.
+    """
 
     model: NonlinearModel
     x0: Array
@@ -23,6 +26,7 @@ class Case:
     u: Callable[[int], list[float]]
     smooth: bool = True
     control: Callable[[Array], Array] | None = None
+    normal: tuple[Array, Array] | None = None
 
     def inputs(self, samples: int) -> Array:
         return np.array([self.u(k) for k in range(samples)], dtype=float).reshape(samples, self.model.n_inputs)
@@ -40,8 +44,9 @@ def cstr(**changes: Any) -> Case:
         w=[0.005, 0.5], physical=([0, 250], [1.1, 600]), largest=([0, 290], [1.05, 480]), **changes,
     )  # fmt: skip
     return Case(
-        model, np.array([0.5, 350.0]), np.array([0.01, 2.0]), lambda k: [300.0], control=lambda y: 4.0 * (350.0 - y)
-    )
+        model, np.array([0.5, 350.0]), np.array([0.01, 2.0]), lambda k: [300.0],
+        control=lambda y: 4.0 * (350.0 - y), normal=(np.array([0.0, 300.0]), np.array([1.1, 400.0])),
+    )  # fmt: skip
 
 
 def tank(**changes: Any) -> Case:

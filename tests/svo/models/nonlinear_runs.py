@@ -1,0 +1,178 @@
+"""Runs of window observers of nonlinear plants: everything that is promised, checked at every sample.
+
+The truth comes from `nonlinear_truth`, which uses nothing of a tape. Checked are the sets, the verdicts, and every
+transition and output that an observer has linearised on its way, against what the plant did there.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polytopes import HPolytope
+from svo import WindowObserver
+from svo.checks import Array
+from svo.models.nonlinear import LinearOutput, NonlinearModel, Span, Transition
+from svo.observers.base import Step
+from tests.svo.models.nonlinear_plants import Case
+from tests.svo.models.nonlinear_truth import Runs, called
+
+HORIZON = 10
+SETTLED = 30  # samples after which widths count
+PART = 1e-3  # of R: the integrator's error that is allowed for
+ROUNDING = 1e-12  # of the sizes of the terms: what the truth in floats cannot tell
+
+
+class Watched(NonlinearModel):
+    """A model that keeps what it was asked for since it was last looked at."""
+
+    moves: list[Transition]
+    outputs_given: list[LinearOutput]
+
+    @classmethod
+    def of(cls, model: NonlinearModel) -> Watched:
+        """The same model."""
+        given = {field.name: getattr(model, field.name) for field in fields(model) if field.init and field.name != "_"}
+        f, h = given.pop("f"), given.pop("h")
+        made = cls(f, h, **given)
+        object.__setattr__(made, "moves", [])
+        object.__setattr__(made, "outputs_given", [])
+        return made
+
+    def transition(self, lower: ArrayLike, upper: ArrayLike, u: ArrayLike = (), *, dt: Any = None) -> Transition:
+        found = super().transition(lower, upper, u, dt=dt)
+        self.moves.append(found)
+        return found
+
+    @cached_property
+    def kernel(self) -> Any:
+        return _Watching(NonlinearModel.kernel.func(self), self.outputs_given)
+
+
+class _Watching:
+    """A kernel whose outputs of samples are kept."""
+
+    def __init__(self, kernel: Any, given: list[LinearOutput]) -> None:
+        self._kernel, self._given = kernel, given
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._kernel, name)
+
+    def measured(self, *arguments: Any) -> tuple[LinearOutput, Span]:
+        """As the kernel's own."""
+        output, left = self._kernel.measured(*arguments)
+        self._given.append(output)
+        return output, left
+
+
+@dataclass
+class Findings:
+    """What happened in runs.
+
+    Attributes
+    ----------
+    count : Counter
+        Samples, verdicts, and whatever must not happen, with run and sample.
+    widths : list of (n,) arrays
+        Of the sets of settled samples in normal operation.
+    closest : float
+        Largest share of R that a transition used.
+    unresolved : float
+        Largest error of the integrator, in R, beyond rounding.
+    """
+
+    count: Counter[str]
+    widths: list[Array]
+    closest: float = 0.0
+    unresolved: float = 0.0
+
+    def failed(self, what: str, where: str) -> None:
+        """Count what must not happen."""
+        self.count[what] += 1
+        self.count[f"{what}: {where}"] += 1
+
+
+def examine_run(case: Case, runs: Runs, j: int, rng: np.random.Generator, dt: bool, found: Findings) -> None:
+    """Drive an observer over run j and note what is not as promised."""
+    model = Watched.of(case.model)
+    one = Runs(**{field.name: getattr(runs, field.name)[..., j] for field in fields(Runs)})
+    lower, upper = case.x0 - case.spread * rng.uniform(1.0, 2.0), case.x0 + case.spread * rng.uniform(1.0, 2.0)
+    for limits in (model.physical_range, model.start_range, model.valid_range):
+        if limits is not None:
+            lower, upper, _ = limits.cut(lower, upper)
+    observer = WindowObserver(model, HPolytope.box(lower, upper), horizon=HORIZON)
+    h, ran_away = called(model.h, model), False
+    for k, (x, y) in enumerate(zip(one.x, one.y, strict=True)):
+        if k == 0:
+            step = observer.update(y0=y, u=one.u[0])
+        else:
+            more = {"dt": float(one.dt[k - 1])} if dt else {}
+            step = observer.step(u=one.u[k - 1], y=y, u_next=one.u[k], **more)
+            _check_moves(model, one, k - 1, found, f"run {j}, sample {k}")
+        _check_outputs(model, h, one, k, found, f"run {j}, sample {k}")
+        ran_away = ran_away or not _is_normal(case, x)
+        found.count["samples"] += 1
+        found.count["runaway"] += ran_away
+        found.count[step.verdict] += 1
+        if step.verdict == "falsified":
+            found.failed("falsified", f"run {j}, sample {k}")
+            return
+        if step.verdict == "undecided":
+            kind = "undecided in a runaway" if ran_away else "undecided in normal operation"
+            found.failed(kind, f"run {j}, {step.reason}")
+        if not contains(step, x):
+            found.failed("excluded", f"run {j}, sample {k}")
+        if k >= SETTLED and not ran_away:
+            found.widths.append(step.box[1] - step.box[0])
+
+
+def contains(step: Step, x: Array) -> bool:
+    """Whether a state is in the box, up to rounding."""
+    lower, upper = step.box
+    room = 1e-9 * (upper - lower) + 1e-13 * np.abs(x)
+    return bool((x >= lower - room).all() and (x <= upper + room).all())
+
+
+def _is_normal(case: Case, x: Array) -> bool:
+    return case.normal is None or bool(((case.normal[0] <= x) & (x <= case.normal[1])).all())
+
+
+def _check_moves(model: Watched, one: Runs, k: int, found: Findings, where: str) -> None:
+    """The true transition from sample k against those that were made of it."""
+    if k + 1 >= len(one.x):
+        return
+    held, x, after = ~model.flow.varying, one.x[k], one.x[k + 1]
+    for move in model.moves:
+        size = np.abs(move.A) @ np.abs(x) + np.abs(move.a) + np.abs(move.E) @ (np.abs(one.w[k]) * held)
+        rest = np.abs(after - move.A @ x - move.a - move.E @ (one.w[k] * held))
+        room = ROUNDING * (size + np.abs(after))
+        used = (np.maximum(rest - room, 0.0) / move.R).max()
+        found.closest = max(found.closest, float(used))
+        found.unresolved = max(found.unresolved, float((np.maximum(one.error[k] - room, 0.0) / move.R).max()))
+        found.count["transitions"] += 1
+        if (rest > move.R * (1.0 + PART) + room).any():
+            found.failed("transition outside R", f"{where}, {used:.6g} of R")
+        if not ((after >= move.box.lower - room) & (after <= move.box.upper + room)).all():
+            found.failed("state outside the transition's box", where)
+    model.moves.clear()
+
+
+def _check_outputs(model: Watched, h: Any, one: Runs, k: int, found: Findings, where: str) -> None:
+    value = h(one.x[k][:, None], one.w[k][:, None], one.u[k][:, None])[:, 0]
+    for output in model.outputs_given:
+        rest = np.abs(value - output.C @ one.x[k] - output.c - output.F @ one.w[k])
+        size = np.abs(output.C) @ np.abs(one.x[k]) + np.abs(output.c) + np.abs(output.F) @ np.abs(one.w[k])
+        found.count["outputs"] += 1
+        if (rest > output.R + 1e-13 * (size + np.abs(value))).any():
+            found.failed("output outside R", where)
+    model.outputs_given.clear()
+
+
+MUST_NOT = (
+    "excluded", "falsified", "transition outside R", "state outside the transition's box", "output outside R",
+)  # fmt: skip
