@@ -10,6 +10,8 @@ import numpy as np
 
 from svo.detection.found import Detection
 from svo.isolation import NOMINAL, Alarm, Bank
+from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
 from svo.pages.tables import TextTable
 from svo.pictures.style import in_seconds
@@ -117,18 +119,25 @@ def models_table(bank: Bank) -> TextTable:
 
 
 def _bounds(observer: Observer, found: Detection) -> dict[str, str]:
-    model = observer.model
-    lower, upper, noise = model.bounds(model.schedule) if model.is_scheduled else model.bounds()
+    model: UncertainModel | NonlinearModel = observer.model
     outputs = [column.label for column in found.plant.columns.outputs]
-    names = dict(model.names or {}).get("disturbances", [f"w[{i}]" for i in range(len(lower))])
+    if isinstance(model, NonlinearModel):
+        noise, (lower, upper) = model.noise, model.flow.w
+        names = [f"disturbance {name}" for name in model.disturbances]
+        names += [f"parameter {name}" for name in model.parameters]
+        further = {}
+    else:
+        lower, upper, noise = model.bounds(model.schedule) if model.is_scheduled else model.bounds()
+        known = dict(model.names or {}).get("disturbances", [f"w[{i}]" for i in range(len(lower))])
+        names = [f"disturbance {name}" for name in known]
+        further = {f"uncertainty {u.name or i}": _range(*u.bounds) for i, u in enumerate(model.uncertainties)}
     told = {f"noise of {output}": f"± {n:.6g}" for output, n in zip(outputs, noise, strict=False)}
-    told |= {f"disturbance {n}": _range(a, b) for n, a, b in zip(names, lower, upper, strict=False)}
-    for i, uncertainty in enumerate(model.uncertainties):
-        told[f"uncertainty {uncertainty.name or i}"] = _range(*uncertainty.bounds)
-    return told
+    return told | {name: _range(a, b) for name, a, b in zip(names, lower, upper, strict=False)} | further
 
 
 def _range(lower: Any, upper: Any) -> str:
+    if lower == upper:
+        return f"{upper:.6g}"
     if lower == -upper:
         return f"± {upper:.6g}"
     return f"{lower:.6g} to {upper:.6g}"

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from svo import detect, find_plant, read_log
 from svo.cli import app
 from svo.detection.found import Detection
-from svo.detection.report.facts import log_facts
+from svo.detection.report.facts import bank_of, bounds_table, log_facts
 from svo.detection.report.options import ReportOptions
 from svo.detection.report.pictures import pictures_of
 from svo.detection.report.report import write_report
@@ -215,6 +215,19 @@ def test_plants_that_are_registered_have_reports_too(tmp_path: Path, name: str) 
     page = report_of(found, tmp_path, channels=[found.record.labels.states[0]])
     assert len(drawn_in(page)) == 2
     assert plant.noise_sets[0] in page
+
+
+def test_a_nonlinear_plant_has_a_report_with_the_bounds_of_its_parameters(tmp_path: Path) -> None:
+    tanks = find_plant(CART.with_name("two_tanks.toml"))
+    found = detect(tanks, read_log(CART.with_name("two_tanks.csv"), tanks))
+    bank = bank_of(found)
+    rows = {row[0]: row[1:] for row in bounds_table(found, bank).rows}
+    models = list(bank.observers)
+    assert dict(zip(models, rows["parameter hole"], strict=True))["leak"] == "0 to 0.2"
+    assert set(rows["disturbance d1"]) == {"± 0.002"}
+    assert set(rows["parameter area"]) == {"154"}
+    assert set(rows["noise of level 2 [cm]"]) == {"± 0.1"}
+    assert len(drawn_in(report_of(found, tmp_path))) == 3
 
 
 def test_names_of_somebody_else_stay_text(tmp_path: Path) -> None:
