@@ -74,6 +74,58 @@ def to_polytope(P: HPolytope) -> Any:
     return polytope.Polytope(rows[:, :-1], -rows[:, -1], normalize=False)
 
 
+def to_shapely(P: HPolytope) -> Any:
+    """A planar bounded set as a shapely `Polygon`, `LineString` or `Point`, an empty polygon if it is empty.
+
+    Raises
+    ------
+    ValueError
+        If the set is not planar.
+    UnboundedError
+        If it is unbounded.
+    ImportError
+        If shapely is not installed.
+    """
+    shapely = _shapely()
+    if P.dim != 2:
+        raise ValueError(f"P has dimension {P.dim}; expected 2: project or slice it first.")
+    corners = P.vertices()
+    if len(corners) < 3:
+        made = (shapely.Polygon, shapely.Point, shapely.LineString)[len(corners)]
+        return made(corners[0] if len(corners) == 1 else corners)
+    offsets = corners - corners.mean(axis=0)
+    return shapely.Polygon(corners[np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]))])
+
+
+def from_shapely(geometry: Any) -> HPolytope:
+    """The set of a convex planar geometry of shapely: a polygon, segment or point; exact where its rows are floats.
+
+    Raises
+    ------
+    ValueError
+        If the geometry is not convex (it then differs from its hull), or has more than two coordinates.
+    ImportError
+        If shapely is not installed.
+    """
+    shapely = _shapely()
+    if geometry.is_empty:
+        return HPolytope.empty(2)
+    points = shapely.get_coordinates(geometry, include_z=geometry.has_z)
+    if points.shape[1] != 2:
+        raise ValueError("geometry has a third coordinate; expected a planar one.")
+    hull = geometry.convex_hull
+    if hull.geom_type != geometry.geom_type or not hull.equals(geometry):
+        raise ValueError(f"geometry is a {geometry.geom_type} that is not convex; take its convex_hull, or its parts.")
+    return HPolytope.from_vertices(np.unique(points, axis=0))
+
+
+def _shapely() -> Any:
+    try:
+        return importlib.import_module("shapely")
+    except ImportError as error:
+        raise ImportError("conversions with shapely need it installed: pip install shapely") from error
+
+
 def _cdd() -> Any:
     try:
         import cdd

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polytopes import plotting
+from polytopes import exchange, plotting
 from polytopes.checks import different_coordinates, real_array, whole_number
 from polytopes.constructions import Constructions
 from polytopes.generators import rows_of_generators
@@ -133,6 +133,35 @@ class HPolytope(Shown, Operators):
 
     def __or__(self, Q: Constructions | Union) -> Union:
         return Union([self]) | Q if isinstance(Q, Constructions | Union) else NotImplemented
+
+    def to_dict(self) -> dict[str, Any]:
+        """The dimension and the rows, each number exactly as ``"numerator/denominator"``, as JSON can hold it."""
+        return exchange.as_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """The set of ``data``, what `to_dict` wrote; numbers may stand for themselves too.
+
+        Raises
+        ------
+        ValueError
+            If a part is missing, or an entry is no number, or one that no float equals.
+        """
+        return cls(*exchange.table_from_dict(data))
+
+    def to_cvxpy(self, x: Any) -> list[Any]:
+        """Constraints ``A x <= b`` and ``C x == d`` on a cvxpy expression x of shape (n,).
+
+        Raises
+        ------
+        ValueError
+            If x has another shape.
+        """
+        return exchange.cvxpy_constraints(self, x)
+
+    def to_linear_constraint(self) -> Any:
+        """A `scipy.optimize.LinearConstraint`, an equality with both bounds alike."""
+        return exchange.linear_constraint(self)
 
     @options_by_name
     def plot(self, ax: Any = None, *, dims: Sequence[int] = (0, 1), **style: Any) -> list[Any]:

@@ -190,6 +190,8 @@ CONSTANTS = (
     Constant("polytopes.exact", "_CANCELLING", "heuristic"),
     Constant("polytopes.least_distance", "_STILL", "heuristic"),
     Constant("polytopes.ellipsoids", "_OPTIMAL", "heuristic"),
+    Constant("svo.analysis.invariant_sets", "_INWARD", "heuristic"),
+    Constant("svo.analysis.invariant_sets", "_SLACK", "heuristic"),
     Constant("polytopes.exact_generators", "_WIDE", "heuristic"),
     Constant("polytopes.plotting", "_REACH", "heuristic"),
 )

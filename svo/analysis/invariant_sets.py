@@ -1,0 +1,234 @@
+"""Sets that a disturbed linear system does not leave: the largest one in a constraint, and a smallest one from outside.
+
+The largest: ``O_0 = X``, ``O_k+1 = O_k`` and the predecessor of O_k, until nothing changes (Gilbert and Tan 1991,
+Kolmanovsky and Gilbert 1998).  The smallest: with ``A^s W`` in ``factor W``, the sum of ``A^i W`` for i < s over
+``1 - factor`` holds it (Rakovic, Kerrigan, Kouramas and Mayne 2005).  What is called invariant is proved: no transition
+from the set leaves it, decided in rationals about the rows and matrices as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polytopes import Certificate, HPolytope, UndecidedError
+from polytopes.shown import Shown
+from polytopes.signatures import options_by_name
+from svo.analysis.one_step_sets import LinearSystem, predecessor, system_of
+from svo.checks import Array, expect, expect_kind, real_array, real_number, whole_number
+from svo.models.model import UncertainModel
+
+_SLACK = 1e-6  # of the factor: room for rounding in the proof
+_INWARD = 1e-11  # of its terms: how far a row moves inward where rounding left no proof
+
+
+@dataclass(frozen=True, eq=False)
+class InvariantSet(Shown):
+    """The answer to a search for an invariant set.
+
+    Attributes
+    ----------
+    status : {"invariant", "empty", "undecided"}
+        "invariant": proved.  "empty": there is none.  "undecided": the search did not end, or left no proof.
+    set : HPolytope
+        The invariant set; where undecided the last iterate, which is not invariant, and where empty the one that is.
+    steps : int
+        Steps of the search; of the smallest set the number of terms of its sum.
+    reason : str
+    system : LinearSystem
+    certificate : Certificate or None
+        With "empty": exact multipliers that prove it of the rows of `set`.
+    factor : float or None
+        Of the smallest set: it is at most so many times as large as the exact one (of the widened system).
+    widened_by : array (n,) or None
+        Half-widths of the box that was added to ``E w``.
+    """
+
+    status: Literal["invariant", "empty", "undecided"]
+    set: HPolytope
+    steps: int
+    reason: str
+    system: LinearSystem
+    certificate: Certificate | None = None
+    factor: float | None = None
+    widened_by: Array | None = None
+
+    def verify(self) -> bool:
+        """Whether the status is proved, once again, in rationals."""
+        if self.status == "empty":
+            return self.certificate is not None and self.certificate.verify(self.set)
+        return self.status == "invariant" and is_invariant(self.set, self.system, self.widened_by)
+
+
+def is_invariant(P: HPolytope, system: LinearSystem, room: Array | None = None) -> bool:
+    """Whether no transition from P leaves it, decided exactly; with inputs, whether some input keeps every state in.
+
+    With inputs that is decided about the predecessor of P, which is exact where its numbers are short (integers and
+    short fractions), and else a little too large: then this is no proof, and False is answered.
+
+    Parameters
+    ----------
+    P : HPolytope
+    system : LinearSystem
+    room : array (n,), optional
+        Half-widths of a box that is added to the next state.
+
+    Raises
+    ------
+    UndecidedError
+        If the program is too large for rationals where floats cannot decide.
+    """
+    if system.inputs is None:
+        n, steps = system.n_states, system.transitions(P, room)
+        return steps <= P.lift(steps.dim, range(steps.dim - n, steps.dim))
+    return _is_short(P, system) and predecessor(P, system) >= P
+
+
+def _is_short(P: HPolytope, system: LinearSystem) -> bool:
+    tables = [P.table, *(Q.table for Q in (system.inputs, system.disturbances) if Q is not None)]
+    numbers = [part.ravel() for table in tables for part in table]
+    numbers += [part.ravel() for part in (system.A, system.B, system.E, system.a)]
+    every = np.concatenate(numbers) * 2.0**16
+    return bool((every == np.round(every)).all() and (np.abs(every) < 2.0**32).all())
+
+
+@options_by_name
+def largest_invariant_set(
+    constraint: HPolytope,
+    system: LinearSystem | UncertainModel,
+    *,
+    inputs: HPolytope | None = None,
+    max_steps: int = 100,
+) -> InvariantSet:
+    """The largest set in a constraint that the system does not leave, for all w (and for some u, where it has inputs).
+
+    Every iterate contains it; the last one is proved invariant where the search ends.  Where rounding leaves no proof
+    of a system without inputs, the search is done again with new rows moved inward by 1e-11 of their terms: then the
+    set is invariant, and smaller than the largest by some such parts.
+
+    Parameters
+    ----------
+    constraint : HPolytope
+    system : LinearSystem or UncertainModel
+    inputs : HPolytope, optional
+        The set of u, where a model is given that has inputs.
+    max_steps : int
+    """
+    expect_kind("constraint", constraint, HPolytope, "an HPolytope")
+    known, most = system_of(system, inputs), whole_number("max_steps", max_steps, least=1)
+    expect(constraint.dim == known.n_states, "constraint", constraint, f"a set in R^{known.n_states}")
+    found = _iterated(constraint, known, most, 0.0)
+    if found.status != "undecided" or known.inputs is not None or found.steps == most:
+        return found
+    again = _iterated(constraint, known, most, _INWARD)
+    return again if again.status == "invariant" else found
+
+
+def _iterated(constraint: HPolytope, system: LinearSystem, most: int, inward: float) -> InvariantSet:
+    """The search, with new rows moved inward by a part of their terms."""
+    current = constraint
+    for step in range(most + 1):
+        answer = current.emptiness()
+        if answer.status == "empty":
+            return InvariantSet("empty", current, step, "an iterate is empty", system, answer.certificate)
+        if answer.status == "undecided" or step == most:
+            break
+        before = predecessor(current, system)
+        if before.contains(current):
+            return _ended(current, constraint, step, system)
+        current = _reduced(current & _moved_inward(before, current, inward))
+    reason = f"it did not end in {step} steps: the set is the last outer iterate, and not invariant"
+    return InvariantSet("undecided", current, step, reason, system)
+
+
+def _moved_inward(before: HPolytope, current: HPolytope, part: float) -> HPolytope:
+    """Rows moved inward by a part of their terms over the bounded current set."""
+    ends = np.abs(current.bounding_box()).max(axis=0)
+    if not part or not np.isfinite(ends).all():
+        return before
+    return before.with_rows(before.A, before.b - part * (np.abs(before.A) @ ends + np.abs(before.b)))
+
+
+def _reduced(P: HPolytope) -> HPolytope:
+    """Without redundant rows; as it is where it is empty, so that the proof is about its rows."""
+    return P if P.emptiness().status == "empty" else P.remove_redundancy()
+
+
+def _ended(found: HPolytope, constraint: HPolytope, step: int, system: LinearSystem) -> InvariantSet:
+    within = found if found <= constraint else found & constraint
+    try:
+        if is_invariant(within, system):
+            return InvariantSet("invariant", within, step, "proved in rationals", system)
+        reason = "its predecessor holds it to within 1e-9, and there is no proof: the set is not known to be invariant"
+    except UndecidedError as error:
+        reason = f"the proof is open: {error}"
+    return InvariantSet("undecided", within, step, reason, system)
+
+
+@options_by_name
+def smallest_invariant_set(
+    system: LinearSystem | UncertainModel, *, factor: float = 0.05, box: ArrayLike | None = None, max_steps: int = 200
+) -> InvariantSet:
+    """A set that a stable system does not leave, little larger than the smallest one (where all trajectories end).
+
+    Parameters
+    ----------
+    system : LinearSystem or UncertainModel
+        Without inputs.
+    factor : float
+        Between 0 and 1: ``A^s W`` is to lie in that part of W; the set is at most ``1 / (1 - factor)`` as large as the
+        smallest one.
+    box : array_like (n,), optional
+        Half-widths of a box that is added to ``E w``: needed if ``E W`` has no interior.  The result is for the system
+        with it, and names it.
+    max_steps : int
+        Limit on the number of terms s.
+
+    Raises
+    ------
+    ValueError
+        If the system has inputs or no disturbances, or ``E W`` (and the box) is unbounded or has no interior.
+    """
+    known = system_of(system)
+    expect(known.inputs is None, "system", "one with inputs", "one without: put a feedback into A")
+    expect(known.disturbances is not None, "system", "one without disturbances", "one with: it ends in a point")
+    wanted, most = real_number("factor", factor, least=0.0), whole_number("max_steps", max_steps, least=1)
+    expect(0.0 < wanted < 1.0, "factor", wanted, "a number between 0 and 1")
+    n = known.n_states
+    room = None if box is None else real_array("box", box, (n,))
+    assert known.disturbances is not None
+    W = known.E @ known.disturbances
+    W = W if room is None else W + HPolytope.box(-room, room)
+    expect(W.is_bounded(), "disturbances", "unbounded", "a bounded set")
+    if W.affine_dim() < n:
+        raise ValueError("E w has no interior; state box=..., half-widths (n,) that are added to it.")
+    middle = W.chebyshev().centre
+    centred = (W - middle).remove_redundancy()
+    limits = centred.support(centred.A)
+    terms, power = [centred], known.A
+    for _ in range(most):
+        reached = float(np.max(centred.support(centred.A @ power) / limits))
+        if reached <= wanted:
+            return _sum(known, terms, reached, middle, room)
+        terms.append(power @ centred)
+        power = power @ known.A
+    reason = f"A^s W is not in {wanted:g} W for s up to {most}: the set is W, and not invariant"
+    return InvariantSet("undecided", W, most, reason, known, widened_by=room)
+
+
+def _sum(
+    system: LinearSystem, terms: list[HPolytope], reached: float, middle: Array, room: Array | None
+) -> InvariantSet:
+    part = reached + _SLACK * (1.0 - reached)
+    total = terms[0]
+    for term in terms[1:]:
+        total = (total + term).remove_redundancy()
+    fixed = np.linalg.solve(np.eye(system.n_states) - system.A, system.a + middle)
+    found = total.scale(1.0 / (1.0 - part)) + fixed
+    proved = is_invariant(found, system, room)
+    reason = "proved in rationals" if proved else "rounding left no proof: the set is not known to be invariant"
+    status: Literal["invariant", "undecided"] = "invariant" if proved else "undecided"
+    return InvariantSet(status, found, len(terms), reason, system, None, 1.0 / (1.0 - part), room)

@@ -1,0 +1,169 @@
+"""What one step of a linear system makes of a set: where it comes from and where it goes.
+
+The system is ``x+ = A x + B u + a + E w`` with the input u in a set U, chosen, and the disturbance w in a set W, not
+chosen.  Everything is an operation of `polytopes` (Blanchini and Miani 2015, chapters 4 and 5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polytopes import HPolytope
+from polytopes.signatures import options_by_name
+from svo.checks import Array, expect, expect_kind, real_array
+from svo.models.model import UncertainModel
+
+
+@options_by_name
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    """``x+ = A x + B u + a + E w``, u in `inputs` and w in `disturbances`.
+
+    Parameters
+    ----------
+    A, B : array_like (n, n) and (n, nu)
+        ``B=None``: no input.
+    a : array_like (n,), optional
+        Zero if absent.
+    E : array_like (n, nw), optional
+        The identity if there are disturbances and it is absent.
+    inputs, disturbances : HPolytope, optional
+        Sets of u and w, not empty; needed if the system has such.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a set is missing or empty, or a shape does not fit.
+    """
+
+    A: Array
+    B: Array
+    a: Array
+    E: Array
+    inputs: HPolytope | None
+    disturbances: HPolytope | None
+
+    def __init__(
+        self,
+        A: ArrayLike,
+        B: ArrayLike | None = None,
+        *,
+        a: ArrayLike | None = None,
+        E: ArrayLike | None = None,
+        inputs: HPolytope | None = None,
+        disturbances: HPolytope | None = None,
+    ) -> None:
+        matrix = real_array("A", A, ("n", "n"))
+        n = len(matrix)
+        expect(matrix.shape == (n, n), "A", matrix.shape, "a square matrix")
+        moved = np.zeros(n) if a is None else real_array("a", a, (n,))
+        given = {"inputs": (B, inputs), "disturbances": (E, disturbances)}
+        blocks = {}
+        for (name, (block, set_of)), column in zip(given.items(), ("B", "E"), strict=True):
+            if set_of is not None:
+                expect_kind(name, set_of, HPolytope, "an HPolytope")
+                expect(not set_of.is_empty(), name, "empty", "a set with a point")
+            matrix_of = np.eye(n) if block is None and column == "E" and set_of is not None else block
+            blocks[column] = np.zeros((n, 0)) if matrix_of is None else real_array(column, matrix_of, (n, "k"))
+            wide = blocks[column].shape[1]
+            expect((set_of.dim if set_of else 0) == wide, name, set_of, f"a set in R^{wide}, the columns of {column}")
+        parts = (matrix, blocks["B"], moved, blocks["E"], inputs, disturbances)
+        for name, value in zip(("A", "B", "a", "E", "inputs", "disturbances"), parts, strict=True):
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(cls, model: UncertainModel, inputs: HPolytope | None = None) -> LinearSystem:
+        """The transition of a model without parametric uncertainties and schedule.
+
+        Parameters
+        ----------
+        model : UncertainModel
+        inputs : HPolytope, optional
+            The set of u; needed if the model has inputs.
+        """
+        expect_kind("model", model, UncertainModel, "an UncertainModel")
+        fixed = not (model.is_scheduled or model.uncertainties)
+        expect(fixed, "model", "scheduled or has uncertainties", "one of fixed matrices: bound the rest as w")
+        lower, upper, _ = model.bounds()
+        W = model.disturbance_polytope or (HPolytope.box(lower, upper) if model.n_disturbances else None)
+        blocks = {name: model.block(name) for name in "ABEa"}
+        B = blocks["B"] if model.n_inputs else None
+        E = blocks["E"] if model.n_disturbances else None
+        return cls(blocks["A"], B, a=blocks["a"].ravel(), E=E, inputs=inputs, disturbances=W)
+
+    @property
+    def n_states(self) -> int:
+        """How many states there are."""
+        return len(self.A)
+
+    def transitions(self, start: HPolytope, room: Array | None = None) -> HPolytope:
+        """All ``(x, u, w, x+)`` with x in `start` and x+ the next state, within `room` (n,) if given; exact."""
+        n, sets = self.n_states, [start, *(P for P in (self.inputs, self.disturbances) if P is not None)]
+        joint = sets[0]
+        for P in sets[1:]:
+            joint = joint.product(P)
+        step = np.hstack([self.A, self.B, self.E, -np.eye(n)])
+        space = joint.lift(step.shape[1])
+        if room is None:
+            return space & HPolytope(np.empty((0, step.shape[1])), [], step, -self.a)
+        return space & HPolytope(np.vstack([step, -step]), np.concatenate([room - self.a, room + self.a]))
+
+
+def system_of(system: LinearSystem | UncertainModel, inputs: HPolytope | None = None) -> LinearSystem:
+    """A system, or that of a model."""
+    return LinearSystem.of(system, inputs) if isinstance(system, UncertainModel) else expected(system)
+
+
+def expected(system: Any) -> LinearSystem:
+    """The system itself; TypeError if it is none."""
+    expect_kind("system", system, LinearSystem, "a LinearSystem or an UncertainModel")
+    found: LinearSystem = system
+    return found
+
+
+@options_by_name
+def predecessor(
+    target: HPolytope, system: LinearSystem | UncertainModel, *, inputs: HPolytope | None = None
+) -> HPolytope:
+    """``{x : there is u in U with A x + B u + a + E w in the target for all w in W}``, exact or outward.
+
+    The Pontryagin difference of the target and ``E W``, pulled back, and projected on x where there are inputs.
+
+    Parameters
+    ----------
+    target : HPolytope
+    system : LinearSystem or UncertainModel
+    inputs : HPolytope, optional
+        The set of u, where a model is given that has inputs.
+    """
+    known = system_of(system, inputs)
+    sure = target if known.disturbances is None else target - known.E @ known.disturbances
+    back = sure.preimage(np.hstack([known.A, known.B]), known.a)
+    if known.inputs is None:
+        return back
+    n = known.n_states
+    joint = back & known.inputs.lift(n + known.inputs.dim, range(n, n + known.inputs.dim))
+    return joint.project(range(n))
+
+
+@options_by_name
+def successor(start: HPolytope, system: LinearSystem | UncertainModel, *, inputs: HPolytope | None = None) -> HPolytope:
+    """``{A x + B u + a + E w : x in start, u in U, w in W}``: what some input and some disturbance reach; or outward.
+
+    Parameters
+    ----------
+    start : HPolytope
+    system : LinearSystem or UncertainModel
+    inputs : HPolytope, optional
+        The set of u, where a model is given that has inputs.
+    """
+    known = system_of(system, inputs)
+    reached = start.affine_map(known.A, known.a)
+    for block, values in ((known.B, known.inputs), (known.E, known.disturbances)):
+        if values is not None:
+            reached = reached + block @ values
+    return reached
