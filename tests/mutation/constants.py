@@ -192,6 +192,6 @@ CONSTANTS = (
     Constant("polytopes.ellipsoids", "_OPTIMAL", "heuristic"),
     Constant("svo.analysis.invariant_sets", "_INWARD", "heuristic"),
     Constant("svo.analysis.invariant_sets", "_SLACK", "heuristic"),
-    Constant("polytopes.exact_generators", "_WIDE", "heuristic"),
+    Constant("polytopes.general_position", "WIDE", "heuristic"),
     Constant("polytopes.plotting", "_REACH", "heuristic"),
 )
