@@ -244,7 +244,7 @@ def _check_log(model: UncertainModel | NonlinearModel, log: Log) -> None:
     if not isinstance(model, NonlinearModel):
         expect_model("model", model)
     expect_log(log)
-    if log.events:
+    if log.events and not isinstance(model, NonlinearModel):
         raise ValueError("the log keeps its own times (Log.events); calibrate takes samples of the model's Ts")
     for name, count in (("u", model.n_inputs), ("y", model.n_outputs)):
         array = getattr(log, name)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from svo.checks import Array
-from svo.isolation import NOMINAL, NONLINEAR, Alarm, BankRecord, Outcome
+from svo.isolation import NOMINAL, NONLINEAR, STAMPED, Alarm, BankRecord, Outcome
 from svo.logs.log import Log
 from svo.models import model_digest
 from svo.models.nonlinear import NonlinearModel
@@ -83,6 +83,8 @@ def alarm_of(
         return Alarm(name, sample, time, proof, source)
     if isinstance(observer.model, NonlinearModel):
         source = {**source, "model": NONLINEAR}
+    elif observer.jitter is not None:
+        source = {**source, "model": STAMPED}
     digest, promises = digest_of_alarm(observer, proof), promises_of(observer)
     return Alarm(name, sample, time, proof, source, digest, promises, _scheduled(observer, proof, schedule))
 

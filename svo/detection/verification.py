@@ -58,9 +58,10 @@ class Verification(Shown):
             return f"{self.about}: there is no alarm, so there is nothing to prove"
         seconds = sum(check.seconds for check in self.checks)
         proven = f"{self.proven} of {len(self.checks)} alarms proven in exact arithmetic"
-        left_out = any(check.ok and NOT_CHECKED in check.reason for check in self.checks)
+        reasons = [check.reason for check in self.checks if check.ok]
+        left_out = [text for text in NOT_CHECKED.values() if any(text in reason for reason in reasons)]
         given = f", given {self.given}" if self.given and self.proven else ""
-        return f"{self.about}: {proven}{given}, in {seconds:.2f} s" + (f" ({NOT_CHECKED})" if left_out else "")
+        return f"{self.about}: {proven}{given}, in {seconds:.2f} s" + (f" ({'; '.join(left_out)})" if left_out else "")
 
     @property
     def failures(self) -> list[str]:

@@ -3,6 +3,7 @@
 from svo.isolation.alarms import (
     NONLINEAR,
     NOT_CHECKED,
+    STAMPED,
     Alarm,
     AlarmCheck,
     check_alarm,
@@ -21,6 +22,7 @@ __all__ = [
     "NOMINAL",
     "NONLINEAR",
     "NOT_CHECKED",
+    "STAMPED",
     "Alarm",
     "AlarmCheck",
     "ArchitectureI",

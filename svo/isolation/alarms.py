@@ -55,7 +55,12 @@ class AlarmCheck(Shown):
 
 NONLINEAR = "nonlinear"
 """Of the source of an alarm: its matrices are those of linearisations."""
-NOT_CHECKED = "that the matrices enclose the nonlinear plant was proven when they were made and is not checked again"
+STAMPED = "jitter"
+"""Of the source of an alarm: the noise of readings whose stamps are off was widened."""
+NOT_CHECKED = {
+    NONLINEAR: "that the matrices enclose the nonlinear plant was proven when they were made and is not checked again",
+    STAMPED: "that the noise was widened enough for the stamps was proven when it was done and is not checked again",
+}
 
 ModelDifference = Callable[[Alarm], str | None]
 
@@ -160,8 +165,8 @@ def check_alarm(alarm: Alarm, log: Log | None = None, model_difference: ModelDif
         if model_difference is not None:
             wrong = wrong or model_difference(alarm)
             compared += ", model as the plant's" if alarm.model else ", model not compared beyond matrices and bounds"
-    if alarm.source.get("model") == NONLINEAR:
-        compared += f"; {NOT_CHECKED}"
+    if (kind := alarm.source.get("model")) in NOT_CHECKED:
+        compared += f"; {NOT_CHECKED[str(kind)]}"
     reason = wrong or f"proven given {alarm.certificate.premise(alarm.sample)}{compared}"
     return AlarmCheck(0, alarm.observer, alarm.sample, wrong is None, reason, perf_counter() - begun)
 

@@ -67,6 +67,12 @@ class Bank(Shown, ABC):
         """Sampling time of the models [s]."""
         return self.observers[NOMINAL].Ts
 
+    @property
+    def jitter(self) -> Array | None:
+        """Bounds (ny,) of the errors of the sensors' time stamps [s], the largest of all models; None if exact."""
+        every = [observer.jitter for observer in self.observers.values() if observer.jitter is not None]
+        return np.max(every, axis=0) if every else None
+
     # -- samples -----------------------------------------------------------------------------------
 
     def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Verdict:

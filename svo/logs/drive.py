@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+
 from svo.checks import Array
 from svo.logs.log import Log, expect_log
 
@@ -87,7 +89,7 @@ def advance_to(driven: Driven[Answer], log: Log, k: int, schedule: Any, **option
     dt = _interval(driven, log, k)
     if dt is not None:
         options = {**options, "dt": dt}
-    return advance(driven, log.u[k - 1] if k else None, log.y[k], log.u[k], schedule, **options)
+    return advance(driven, log.u[k - 1] if k else None, readings_at(driven, log, k), log.u[k], schedule, **options)
 
 
 def _interval(driven: Driven[Answer], log: Log, k: int) -> float | None:
@@ -98,3 +100,18 @@ def _interval(driven: Driven[Answer], log: Log, k: int) -> float | None:
     if log.events:
         raise TypeError(f"{type(driven).__name__} takes no log that keeps its own times (Log.events); resample it")
     return None
+
+
+def readings_at(driven: Any, log: Log, k: int) -> Array:
+    """The measurement (ny,) at sample k of a log, without readings that ``driven`` cannot take.
+
+    A reading whose time stamp is off (``driven.jitter``) may have been taken after an input that changes that soon.
+    """
+    jitter, y = getattr(driven, "jitter", None), log.y[k]
+    if jitter is None:
+        return y
+    end = int(np.searchsorted(log.time, log.time[k] + jitter.max(), side="left"))
+    for later in range(k + 1, end):
+        if (log.u[later] != log.u[k]).any():
+            return np.where(log.time[later] - log.time[k] < jitter, np.nan, y)
+    return y

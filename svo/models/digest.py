@@ -79,6 +79,8 @@ def model_digest(model: UncertainModel | NonlinearModel, options: Options, sampl
         "options": dict(options),
         "samples": [{"stack": s.stack, "noise": s.noise, "w": s.w} for s in samples],
     }
+    if model.jitter is not None:
+        content["jitter"] = model.jitter
     for name, promise in (("physical", model.physical_range), ("largest", model.start_range)):
         if promise is not None:
             content[name] = [promise.lower, promise.upper]

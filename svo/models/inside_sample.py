@@ -36,6 +36,17 @@ def _is_settled(value: arb) -> bool:
     return bool(value.rad() == 0) or bool(value.rel_accuracy_bits() > 100)
 
 
+def carried(A: Array, Ts: float) -> Array:
+    """int_0^Ts exp(M t) dt (n, n), rounded up, M being A with the absolute values of its off-diagonal entries.
+
+    It bounds, entry by entry, what a signal between -1 and 1 that enters each state adds to the states within Ts.
+    """
+    n = len(A)
+    with ctx.workprec(_BITS):
+        joint = (ball_matrix(np.block([[_metzler(A), np.eye(n)], [np.zeros((n, 2 * n))]])) * arb(Ts)).exp()
+        return _rounded_up([[joint[i, n + j] for j in range(n)] for i in range(n)])
+
+
 def growth(A: Array, Ts: float) -> Array:
     """int_0^Ts exp(M (Ts - t)) t dt (n, n), M being A with the absolute values of its off-diagonal entries.
 

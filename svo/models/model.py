@@ -161,6 +161,12 @@ class UncertainModel(Shown):
         return may_be_nonzero(self.D, *(u.D for u in self.uncertainties))
 
     @property
+    def jitter(self) -> Array | None:
+        """Bounds (ny,) of the errors of the sensors' time stamps [s]; None if they are exact."""
+        stamps = None if self.origin is None else self.origin.stamps
+        return None if stamps is None else stamps.jitter
+
+    @property
     def disturbance_polytope(self) -> HPolytope | None:
         """The disturbance set, where it was given as a polytope."""
         return self.w if isinstance(self.w, HPolytope) else None
@@ -281,6 +287,7 @@ class UncertainModel(Shown):
         Ts: float,
         remainder: ArrayLike | Mapping[str, ArrayLike] | None = None,
         varying: str | Sequence[str] = (),
+        jitter: ArrayLike | None = None,
         **rest: Any,
     ) -> UncertainModel:
         """Discretisation of dx/dt = A x + B u + a + E w + sum_i Delta_i (A_i x + B_i u + a_i + E_i w).
@@ -308,6 +315,9 @@ class UncertainModel(Shown):
         varying : str or sequence of str
             What varies inside a sample, within its bounds: "all", "w" or "Delta" (all of them), "w[0]", "Delta[1]", or
             names of disturbances and uncertainties. "all" and "Delta" hold for the Delta of a fault too.
+        jitter : float or (ny,) array, optional
+            Bound of the error of the time stamps [s]: a reading may have been taken so much before or after its stamp.
+            Inputs change at their stamps. Rows of such sensors are widened by what the output can change meanwhile.
 
         Raises
         ------
@@ -316,7 +326,7 @@ class UncertainModel(Shown):
         """
         arrays = {"A": A, "B": B, "C": C, "Ts": Ts} | rest
         check_constant(arrays)
-        made: UncertainModel = Origin(cls(**arrays), remainder, varying).model()
+        made: UncertainModel = Origin(cls(**arrays), remainder, varying, jitter=jitter).model()
         return made
 
     @classmethod
@@ -419,6 +429,8 @@ class UncertainModel(Shown):
         return Log(time=time, u=inputs, y=np.array(outputs), x=np.array(states), schedule=values)
 
 
-def expect_model(name: str, value: Any) -> None:
-    """TypeError unless it is a model."""
+def expect_model(name: str, value: Any, *, jitter: bool = False) -> None:
+    """TypeError unless it is a model; ValueError if its sensors' stamps are off, but where ``jitter`` is taken."""
     expect_kind(name, value, UncertainModel, "an UncertainModel")
+    if value.jitter is not None and not jitter:
+        raise ValueError(f"{name} has jitter, which only WindowObserver takes; make it without")

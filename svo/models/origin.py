@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from svo.models.discretisation import (
 )
 from svo.models.held import Varying
 from svo.models.stack import STATE_BLOCKS
+from svo.models.stamps import StampErrors, jitter_of
 from svo.models.uncertainty import Uncertainty
 
 Change = Callable[[Plant], Plant]
@@ -37,7 +39,7 @@ class Origin(Shown):
     ----------
     plant : svo.UncertainModel
         Its arrays are those of dx/dt = ...; never observed.
-    remainder, varying
+    remainder, varying, jitter
         As given to `UncertainModel.from_continuous`.
     overwritten : bool
         Whether the discrete model got arrays of discrete time since.
@@ -47,12 +49,20 @@ class Origin(Shown):
     remainder: Any = None
     varying: str | Sequence[str] = ()
     overwritten: bool = False
+    jitter: Any = None
+
+    @cached_property
+    def stamps(self) -> StampErrors | None:
+        """What the sensors' stamps make of their readings; None if they are exact."""
+        jitter = jitter_of(self.jitter, self.plant.n_outputs)
+        return None if jitter is None else StampErrors(self.plant, jitter)
 
     def model(self) -> Plant:
         """The discrete model; raises as `UncertainModel.from_continuous`."""
         check_constant(vars(self.plant))
         vary = vary_in(self.plant, self.varying)
-        return replace(_discretised(self.plant, self._width(vary), vary), origin=self)
+        parted = vary.delta | (self.stamps is not None)
+        return replace(_discretised(self.plant, self._width(vary), vary, parted), origin=self)
 
     def over(self, dt: float) -> Plant:
         """The discrete model of transitions that take ``dt`` seconds.
@@ -72,6 +82,11 @@ class Origin(Shown):
     def after(self, changes: Mapping[str, Any]) -> Origin:
         """The origin of the discrete model once some of its arguments were replaced."""
         if not changes.keys() <= _ALIKE_IN_BOTH_TIMES:
+            if self.stamps is not None:
+                raise ValueError(
+                    f"{', '.join(sorted(changes.keys() - _ALIKE_IN_BOTH_TIMES))} would be of discrete time, and jitter "
+                    "needs the plant in continuous time; change that by in_given_time"
+                )
             return replace(self, overwritten=True)
         kept = dict(changes)
         if kept.get("names") is not None:  # the discrete model has more disturbances
@@ -96,7 +111,7 @@ class Origin(Shown):
         plant = change(self.plant)
         if remainder is None:
             self._check_still_bounded(plant)
-        return Origin(plant, self.remainder if remainder is None else remainder, self.varying).model()
+        return replace(self, plant=plant, remainder=self.remainder if remainder is None else remainder).model()
 
     def direction(self, item: Uncertainty) -> Uncertainty:
         """What an uncertainty of the plant adds to the next sample per Delta, to first order."""
@@ -152,8 +167,8 @@ def _product_varies(plant: Plant, vary: Varying) -> bool:
     return bool(vary.w.any()) and any(item.E is not None for item in plant.uncertainties)
 
 
-def _discretised(plant: Plant, width: Array | None, vary: Varying) -> Plant:
-    """The discrete model, with |remainder| <= ``width`` (n,)."""
+def _discretised(plant: Plant, width: Array | None, vary: Varying, parted: NDArray[np.bool_]) -> Plant:
+    """The discrete model, with |remainder| <= ``width`` (n,); a Delta is ``parted`` between output and state."""
     A, Ts = plant.block("A"), plant.Ts
     step, gamma = zero_order_hold(A, np.eye(len(A)), Ts)
     arrays: dict[str, Any] = {"A": step}
@@ -170,7 +185,7 @@ def _discretised(plant: Plant, width: Array | None, vary: Varying) -> Plant:
     items = [_directions(gamma, item) for item in plant.uncertainties]
     if width is not None:
         arrays, items = _with_more_disturbances(plant, arrays, items, width, vary.w)
-    parts = [part for item, moves in zip(items, vary.delta, strict=True) for part in _parted(item, bool(moves))]
+    parts = [part for item, two in zip(items, parted, strict=True) for part in _parted(item, bool(two))]
     return replace(plant, **arrays, uncertainties=parts)
 
 
@@ -179,10 +194,10 @@ def _directions(gamma: Array, item: Uncertainty) -> Uncertainty:
     return replace(item, **{k: gamma @ np.asarray(v, dtype=float) for k, v in given.items() if v is not None})
 
 
-def _parted(item: Uncertainty, varies: bool) -> list[Uncertainty]:
-    """A Delta that varies has a mean over the sample for the state, and a value at its beginning for the output."""
+def _parted(item: Uncertainty, two: bool) -> list[Uncertainty]:
+    """A Delta that varies has a mean over the sample for the state, and a value at its reading for the output."""
     names = "CDcF"
-    if not varies or all(getattr(item, name) is None for name in names):
+    if not two or all(getattr(item, name) is None for name in names):
         return [item]
     output = Uncertainty(**{name: getattr(item, name) for name in names}, bounds=item.bounds, name=item.name)
     if all(getattr(item, name) is None for name in STATE_BLOCKS):

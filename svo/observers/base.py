@@ -71,6 +71,8 @@ class Observer(Shown, ABC):
         Whether it can start with nothing known of the state: `_lose_set` is defined.
     takes_intervals : bool
         Whether a transition may take another time than the sampling time: `_set_interval` is defined.
+    takes_jitter : bool
+        Whether its model may have sensors whose time stamps are off.
     takes_nonlinear : bool
         Whether its model may be a `NonlinearModel`.
     largest_at : int or None
@@ -83,6 +85,7 @@ class Observer(Shown, ABC):
     saves_state: ClassVar[bool] = False
     starts_without_set: ClassVar[bool] = False
     takes_intervals: ClassVar[bool] = False
+    takes_jitter: ClassVar[bool] = False
     takes_nonlinear: ClassVar[bool] = False
 
     model: UncertainModel
@@ -99,7 +102,7 @@ class Observer(Shown, ABC):
     @classmethod
     def _expect_model(cls, model: Any) -> None:
         if not (cls.takes_nonlinear and isinstance(model, NonlinearModel)):
-            expect_model("model", model)
+            expect_model("model", model, jitter=cls.takes_jitter)
 
     def __repr__(self) -> str:
         options = ", ".join(f"{name} {brief(value)}" for name, value in self._options().items())
@@ -117,6 +120,11 @@ class Observer(Shown, ABC):
     def Ts(self) -> float:
         """Sampling time of the model [s]."""
         return self.model.Ts
+
+    @property
+    def jitter(self) -> Array | None:
+        """Bounds (ny,) of the errors of the sensors' time stamps [s]; None if they are exact."""
+        return self.model.jitter
 
     @property
     def needs_next_input(self) -> bool:

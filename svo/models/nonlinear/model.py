@@ -22,8 +22,10 @@ from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput, check_output
 from svo.models.nonlinear.plant_kernel import PlantKernel
 from svo.models.nonlinear.simulation import given_values, simulated
+from svo.models.nonlinear.stamps import stamped
 from svo.models.nonlinear.tracing import Function, OfVectors, Symbols, retraced, traced
 from svo.models.nonlinear.transition import Transition
+from svo.models.stamps import jitter_of
 from svo.models.state_range import StateRange, start_range, state_range
 
 
@@ -59,6 +61,9 @@ class NonlinearModel(Value, Shown):
     varying : str or sequence of str
         Disturbances and parameters that may change inside a sample: their names, "w" (all disturbances), "p" (all
         parameters) or "all". The others are held from sample to sample.
+    jitter : float or (ny,) array, optional
+        Bound of the error of the time stamps [s]: a reading may have been taken so much before or after its stamp. Only
+        of equations in continuous time. Inputs change at their stamps.
     physical : (lower, upper), optional
         The state never leaves this range: a promise about the plant at all times; -inf or inf where there is none.
     valid : (lower, upper), optional
@@ -92,6 +97,7 @@ class NonlinearModel(Value, Shown):
     n: Any = 0.0
     w: Any = None
     varying: str | Sequence[str] = ()
+    jitter: Any = None
     physical: Any = None
     valid: Any = None
     largest: Any = None
@@ -142,6 +148,8 @@ class NonlinearModel(Value, Shown):
         put("outputs", outputs or tuple(f"y[{i}]" for i in range(ny)))
         noise = np.full(ny, self.n) if np.ndim(self.n) == 0 else self.n
         put("noise", sizes("n", noise, ny))
+        put("jitter", jitter_of(self.jitter, ny))
+        expect(self.continuous or self.jitter is None, "jitter", self.jitter, "None for equations in discrete time")
 
     def __getstate__(self) -> dict[str, Any]:
         """Functions travel as what they were traced to: a pickle need not know where they were written."""
@@ -276,6 +284,30 @@ class NonlinearModel(Value, Shown):
         """
         inputs = finite_array("u", u, (self.n_inputs,))
         return self.kernel.output(*self._box(lower, upper), inputs)
+
+    def output_near(self, lower: Array, upper: Array, u: Array, around: tuple[Array, Array]) -> LinearOutput:
+        """As `output`, for readings within ``jitter`` of a sample.
+
+        Parameters
+        ----------
+        lower, upper : (n,) arrays
+            States at the sample.
+        u : (nu,) array
+            From the sample on.
+        around : (lower, upper) of (nu,) arrays
+            Bounds of the inputs of that time.
+
+        Raises
+        ------
+        Undecided
+            If it is not enclosed.
+        """
+        found = self.output(lower, upper, u)
+        if self.jitter is None:
+            return found
+        return stamped(
+            self.flow, self.reading, found, self.jitter, Span(lower, upper), Span(*around), tuple(self.outputs or ())
+        )
 
     def check_first(self, lower: Array, upper: Array) -> None:
         """Refuse first states from ``lower`` to ``upper`` (n,) for which the equations do not hold or have no value.

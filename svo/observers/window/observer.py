@@ -21,6 +21,7 @@ from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel
 from svo.models.intervals import check_splits, transition_rows
 from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
+from svo.models.recent_inputs import RecentInputs
 from svo.models.state_range import within
 from svo.observers.answers import VerdictName
 from svo.observers.base import Observer, Seen, Step
@@ -36,9 +37,11 @@ from svo.observers.window.memory import WindowSettings
 from svo.observers.window.relinearised import Relinearised
 from svo.observers.window.sample import Outgrown, Sample, check_matrices
 from svo.observers.window.setup import arrival_of, needs_next_input, template_rows
+from svo.observers.window.stamped import Stamped
 from svo.observers.window.step import WindowStep
 from svo.observers.window.window import Prover, Window
 
+_ROUNDED_UP = 8.0 * float(np.finfo(float).eps)
 _BLURRED = 1e-3  # of a reading's own width: the share of its slack by the width of the set from which a restart pays
 _BRIEF = 0.05  # seconds of a call of the kernel after which the next may take more samples: Ctrl-C waits for its end
 _MOST_AT_ONCE = 1024  # samples
@@ -83,8 +86,11 @@ class WindowObserver(Observer):
     with all sensors, by itself (`svo.observers.window.output_injection`).
     """
 
+    _dt: float | None = None  # seconds of the transition that is being taken; None = the model's Ts
+
     kind = "window"
     takes_deadline = takes_late = saves_state = starts_without_set = takes_intervals = takes_nonlinear = True
+    takes_jitter = True
 
     @options_by_name
     def __init__(
@@ -114,8 +120,12 @@ class WindowObserver(Observer):
 
     def _plan_for(self, model: UncertainModel | NonlinearModel) -> UncertainModel:
         """The linear model of the window, and what makes one of a nonlinear model."""
-        self.model, self._plant = model, None  # type: ignore[assignment]
+        self.model, self._plant, self._stamped, self._recent = model, None, None, None  # type: ignore[assignment]
+        if model.jitter is not None:
+            self._recent = RecentInputs.none(float(model.jitter.max()), model.n_inputs)
         if isinstance(model, UncertainModel):
+            if model.origin is not None and model.origin.stamps is not None:
+                self._stamped = Stamped(model, model.origin.stamps)
             return model
         self._plant = Relinearised(model)
         carrier: UncertainModel = model.carrier
@@ -126,7 +136,11 @@ class WindowObserver(Observer):
         self._settings, self._form = settings, settings.form
         self.horizon, self.eps, self.sign_split = settings.horizon, settings.eps, settings.sign_split
         self._normal, self._make_prover = settings.form.model, prover
-        self._wants_next_input = needs_next_input(self._normal) or self.model.uses_input_in_output
+        self._wants_next_input = (
+            needs_next_input(self._normal) or self.model.uses_input_in_output or self._recent is not None
+        )
+        if self._stamped is not None and settings.injection is not None:
+            raise ValueError("jitter is given, and exact sensors read every disturbance; state a noise n above zero")
         self.prover = None if prover is None else prover(False)
 
     @property
@@ -177,6 +191,8 @@ class WindowObserver(Observer):
         """
         if self._plant is not None:
             raise TypeError("the observer has a nonlinear model; a proof from its first sample on takes a linear one")
+        if self._stamped is not None:
+            raise TypeError("the observer's model has jitter; a proof from its first sample on takes exact stamps")
         again = copy(self)
         again._configure(replace(self._settings, sign_split=0), prover)
         again._forget()
@@ -203,8 +219,11 @@ class WindowObserver(Observer):
         self._readings: Readings | None = None  # of a set that is lost, or too wide
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)  # samples since each sensor was read
         self._window = Window(self._settings, initial, prover=self.prover)
+        lower, upper = initial.box_lower * self._form.x, initial.box_upper * self._form.x
         if self._plant is not None:
-            self._plant.start_from(Span(initial.box_lower * self._form.x, initial.box_upper * self._form.x))
+            self._plant.start_from(Span(lower, upper))
+        if self._stamped is not None:
+            self._stamped.start_from(lower, upper)
 
     def _lose_set(self) -> None:
         largest = self._normal.start_range
@@ -215,16 +234,36 @@ class WindowObserver(Observer):
             self.largest_at, self._missing[:] = 0, self._horizon_of_gaps
 
     def _update(self, y: Array, u: Array, schedule: Any) -> WindowStep:
-        return self._said(self._take(self._sample(np.zeros(self.model.n_inputs), u, y, schedule), None))
+        recent = None if self._recent is None else RecentInputs.none(self._recent.reach, u.size)
+        around = None if recent is None else recent.around(u)
+        return self._seen(recent, around, np.zeros(u.size), u, y, schedule, None)
 
     def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> WindowStep:
+        dt, self._dt = self._dt, None
+        recent = None if self._recent is None else self._recent.moved(u, dt or self.Ts)
+        around = None if recent is None else recent.around(u_next)
         if self._plant is not None:
-            self._relinearise(self._plant, u)
-        return self._said(self._take(self._sample(u, u_next, y, schedule), end))
+            self._relinearise(self._plant, u, dt)
+        elif self._stamped is not None:
+            lower, upper = self._newest_bounds(None if self._lost else self._window)
+            n = self.model.n_states
+            self._stamped.moved(Span(lower[:n] * self._form.x, upper[:n] * self._form.x), u, dt)
+        return self._seen(recent, around, u, u_next, y, schedule, end)
+
+    def _seen(
+        self, recent: RecentInputs | None, around: tuple[Array, Array] | None,
+        u: Array, u_next: Array, y: Array, schedule: Any, end: float | None,
+    ) -> WindowStep:  # fmt: skip
+        """The answer at a sample, about which the inputs are within ``around``."""
+        verdict = self._take(self._sample(u, u_next, y, schedule, around), end)
+        if recent is not None and around is not None:
+            assert self.model.jitter is not None
+            self._recent = recent.read(float(self.model.jitter[~np.isnan(y)].max(initial=0.0)), around)
+        return self._said(verdict)
 
     def _set_interval(self, dt: float | None) -> None:
+        self._dt = dt
         if self._plant is not None:
-            self._plant.dt = dt
             return
         check_splits(self.model)
         if self._settings.injection is not None:
@@ -251,6 +290,10 @@ class WindowObserver(Observer):
         return self._window.read_at(sample)
 
     def _late_update(self, y: Array, sample: int) -> WindowStep:
+        if self._recent is not None:
+            raise ValueError(
+                "y came late, and its stamp is not exact (jitter): which inputs it had is not known any more"
+            )
         known = self._form.outputs(y)
         if self._readings is not None:
             self._readings.add_late(known, self._number - sample)
@@ -282,6 +325,8 @@ class WindowObserver(Observer):
             state |= self._readings.state()
         if self._plant is not None:
             state |= self._plant.state()
+        if self._recent is not None:
+            state |= self._recent.state()
         return state | self._form.state_dict() | window.state()
 
     def _set_up(self, model: UncertainModel | NonlinearModel, state: Mapping[str, NDArray[Any]]) -> None:
@@ -308,6 +353,10 @@ class WindowObserver(Observer):
             raise ValueError("it has lost its set, and holds no readings to find one again")
         if self._plant is not None:
             self._plant.resume(state, has_samples=self._number >= 0)
+        if self._recent is not None:
+            self._recent = RecentInputs.of_state(self._recent.reach, self.model.n_inputs, state)
+        if self._stamped is not None:
+            self._stamped.start_from(self._initial.box_lower * self._form.x, self._initial.box_upper * self._form.x)
         return self._said("falsified") if falsified else None
 
     def _read_arrival(self, state: Mapping[str, NDArray[Any]], name: str) -> ArrivalSet:
@@ -341,7 +390,7 @@ class WindowObserver(Observer):
     def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | None:
         """Samples of a log for one call of the kernel; None where the next one needs more than that."""
         gone = self._lost or self._alarm is not None or self._readings is not None or self._missing.any()
-        if gone or self._plant is not None or log.keeps_its_times(self.Ts):
+        if gone or self._plant is not None or self._stamped is not None or log.keeps_its_times(self.Ts):
             return None
         last = min(first + min(count, self._window.takes_at_once), len(log))
         return log_samples(self._form, log, first, last, self._wants_next_input)
@@ -375,12 +424,16 @@ class WindowObserver(Observer):
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _sample(self, u: Array, u_next: Array, y: Array, schedule: Any) -> Sample:
+    def _sample(self, u: Array, u_next: Array, y: Array, schedule: Any, around: tuple[Array, Array] | None) -> Sample:
         """Model and data of a sample, in normal form."""
         form = self._form
         if self._plant is not None:
-            schedule, y = self._plant.measured(y, u_next, self._number)
+            schedule, y = self._plant.measured(y, u_next, self._number, around)
         stack, (w_lower, w_upper, noise) = self._normal.stack(schedule), self._normal.bounds(schedule)
+        if self._stamped is not None and around is not None:
+            y, widening = self._stamped.measured(y, around, u_next)
+            stack = self._stamped.errors.applied(stack, self._stamped.errors.shift / form.y)
+            noise = (noise + widening / form.y) * (1.0 + _ROUNDED_UP)
         u_next = form.inputs(u_next) if self._wants_next_input else u_next  # else zeros
         return Sample(form.inputs(u), u_next, form.outputs(y), stack, noise, w_lower, w_upper, y)
 
@@ -398,10 +451,9 @@ class WindowObserver(Observer):
             return self._give_up(sample)
         return verdict if verdict == "falsified" else self._watch(sample, verdict)
 
-    def _relinearise(self, plant: Relinearised, u: Array) -> None:
+    def _relinearise(self, plant: Relinearised, u: Array, dt: float | None) -> None:
         """Hand over the transition from the newest sample; where there is none, the set starts again."""
         n = self.model.n_states
-        dt, plant.dt = plant.dt, None
         try:
             if self._lost:
                 raise Undecided(OUTGROWN)
@@ -463,6 +515,8 @@ class WindowObserver(Observer):
     def _lose(self) -> None:
         """There is no set any more."""
         self.largest_at, self._lost, self._readings = None, True, self._new_readings()
+        if self._stamped is not None:
+            self._stamped.box = None
         self._stopped += self._window.stopped
         self._window = Window(self._settings, self._window.anchor, prover=self.prover)
 
@@ -499,7 +553,7 @@ class WindowObserver(Observer):
 
     def _watch(self, sample: Sample, verdict: VerdictName) -> VerdictName:
         """Look for readings that bound the state better than a set that a gap has blurred."""
-        if self._plant is not None:
+        if self._plant is not None or self._stamped is not None:
             return verdict
         if self._readings is None:
             if not (any(map(math.isnan, sample.y.tolist())) or any(self._missing.tolist())):  # short: fastest so

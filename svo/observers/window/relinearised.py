@@ -36,18 +36,15 @@ class Relinearised:
         Why the newest sample was not linearised.
     now, before : Linearisation or None
         Of the newest sample, which has no transition yet, and of the one before it.
-    dt : float or None
-        Seconds that the next transition is to take; None = the model's ``Ts``.
     """
 
     def __init__(self, model: NonlinearModel) -> None:
-        self.model, self.reason, self.dt = model, None, None
+        self.model, self.reason = model, None
         self.start_from(Span(model.start_range.lower, model.start_range.upper))
         self.now: Linearisation | None = None
         self.before: Linearisation | None = None
 
     reason: str | None
-    dt: float | None
 
     def start_from(self, box: Span) -> None:
         """Nothing is known of the newest state but a box."""
@@ -80,11 +77,16 @@ class Relinearised:
         self.start_from(Span(largest.lower, largest.upper))
         return self.box
 
-    def measured(self, y: Array, u: Array, sample: int) -> tuple[Linearisation, Array]:
+    def measured(
+        self, y: Array, u: Array, sample: int, around: tuple[Array, Array] | None = None
+    ) -> tuple[Linearisation, Array]:
         """The newest sample without a transition, and its readings: none where the output is not enclosed."""
         model = self.model
         try:
-            output, self.box = model.kernel.measured(self.box, y, u)
+            if around is None:
+                output, self.box = model.kernel.measured(self.box, y, u)
+            else:
+                output, self.box = self._near(y, u, around)
         except Undecided as error:
             self.reason = self.reason or f"{OUTSIDE_MODEL}: at sample {sample}, {error}"
             nothing = [np.zeros((len(y), size)) for size in (model.n_states, len(model.flow.varying))]
@@ -92,6 +94,17 @@ class Relinearised:
             y = np.full(len(y), np.nan)
         self.now = Linearisation.before(output, model.noise)
         return self.now, y
+
+    def _near(self, y: Array, u: Array, around: tuple[Array, Array]) -> tuple[LinearOutput, Span]:
+        """The output where readings may be of other instants, about which inputs are within ``around``, and its box.
+
+        Once more over what the readings leave, which narrows what may happen meanwhile.
+        """
+        box, model = self.box, self.model
+        for _ in range(2):
+            output = model.output_near(*box, u, around)
+            box = model.kernel.cut(box, y, output) or box
+        return output, box
 
     # -- saved states ------------------------------------------------------------------------------------
 

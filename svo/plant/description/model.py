@@ -17,7 +17,7 @@ from svo.plant.description.table import Table
 ARRAYS = ("A", "B", "a", "E", "C", "D", "c", "F")
 BOUNDS = ("n", "w")
 RANGES = ("physical", "largest")
-_MODEL = (*ARRAYS, *BOUNDS, *RANGES, "continuous", "remainder", "varying", "file", "uncertainties")
+_MODEL = (*ARRAYS, *BOUNDS, *RANGES, "continuous", "remainder", "varying", "jitter", "file", "uncertainties")
 _UNCERTAINTY = (*ARRAYS, "bounds", "name")
 
 
@@ -31,13 +31,15 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
     uncertainties = [_uncertainty(entry) for entry in table.tables("uncertainties", _UNCERTAINTY)]
     rest: dict[str, Any] = {"Ts": top.number("Ts"), "uncertainties": uncertainties}
     continuous = table.truth("continuous", False)
-    for key in ("remainder", "varying"):
+    for key in ("remainder", "varying", "jitter"):
         if not continuous and key in table:
             raise table.error(key, "has no meaning for a discrete model; drop it, or say continuous = true")
     if "remainder" in table:
         rest["remainder"] = remainder_of(table)
     if "varying" in table:
         rest["varying"] = table.content["varying"]
+    if "jitter" in table:
+        rest["jitter"] = stamps_of(table)
     if "n" not in arrays:
         # Taken as zero, a bound that was forgotten falsifies the plant at its first noisy sample.
         raise table.error(
@@ -57,6 +59,11 @@ def model_of(top: Table, names: Mapping[str, Sequence[str]]) -> UncertainModel:
             )
     model = model.replace(names=names)
     return model if model.origin is None else model.origin.model()  # which names what discretisation left out
+
+
+def stamps_of(table: Table) -> Any:
+    """Bounds of the errors of time stamps: a number, or one an output."""
+    return table.array("jitter") if isinstance(table.content["jitter"], list) else table.number("jitter")
 
 
 def remainder_of(table: Table) -> Any:

@@ -7,11 +7,12 @@ from typing import Any
 
 from svo.models.nonlinear import NonlinearModel
 from svo.plant.description.faults import KEYS, FaultModel, check_name, fault_of
-from svo.plant.description.model import ARRAYS, range_of
+from svo.plant.description.model import ARRAYS, range_of, stamps_of
 from svo.plant.description.table import Table
 
 _MODEL = (
     "dynamics", "outputs", "disturbances", "n", "physical", "valid", "largest", "varying", "continuous",
+    "jitter",
 )  # fmt: skip
 _FAULTS = {"sensor": KEYS["sensor"], "actuator": KEYS["actuator"], "plant": (*ARRAYS, "magnitude")}
 _ROWS = {"dynamics": "f", "outputs": "h"}
@@ -43,7 +44,8 @@ def nonlinear_model_of(top: Table, names: Mapping[str, Sequence[str]]) -> Nonlin
             dynamics, outputs, states=list(dynamics), inputs=names["inputs"], outputs=names["outputs"],
             disturbances=list(bounds), w=([low for low, _ in bounds.values()], [high for _, high in bounds.values()]),
             parameters=_numbers(top.table("parameters")), Ts=top.number("Ts"), n=table.array("n"),
-            varying=table.content.get("varying", ()), continuous=table.truth("continuous", True), **ranges,
+            varying=table.content.get("varying", ()), continuous=table.truth("continuous", True),
+            jitter=stamps_of(table) if "jitter" in table else None, **ranges,
         )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ SPREAD = 0.9  # of an interval, about its mean
 class EventCase:
     """A model, a log of a healthy plant with the truth in it, and a set of first states."""
 
-    model: UncertainModel
+    model: Any  # UncertainModel or NonlinearModel
     log: Log
     first: HPolytope
 
@@ -41,6 +41,14 @@ class Signals:
     w: Array
     delta: Array
     x: Array
+
+
+def clocks(rng: np.random.Generator, ny: int, samples: int, Ts: float, rates: tuple[float, ...]) -> list[Array]:
+    """Times at which each of ny sensors is read, and those at which the input changes; all the same in some runs."""
+    steps = lambda mean: np.cumsum(mean * rng.uniform(1.0 - SPREAD, 1.0 + SPREAD, samples))  # noqa: E731
+    if rng.random() < 0.3:
+        return [steps(Ts)] * (ny + 1)
+    return [steps(Ts * rng.choice(rates)) for _ in range(ny + 1)]
 
 
 class EventPlant:
@@ -67,10 +75,13 @@ class EventPlant:
         rng, names = self.rng, STATE if self.rng.random() < 0.6 else OUTPUT
         chosen = [name for name in names if rng.random() < 0.5] or [names[0]]
         column, rows = rng.normal(size=self.shapes[names[0]][0]), {}
+        if names is OUTPUT:  # one sensor's: with jitter they are read at times of their own
+            column[np.arange(self.ny) != rng.integers(self.ny)] = 0.0
         for name in chosen:  # rank one, or any
             shape = self.shapes[name]
             of_rank_one = np.multiply.outer(column, rng.normal(size=shape[1:]))
-            rows[name] = 0.3 * (rng.normal(size=shape) if rng.random() < 0.3 else of_rank_one)
+            is_any = names is STATE and rng.random() < 0.3
+            rows[name] = 0.3 * (rng.normal(size=shape) if is_any else of_rank_one)
         return rows
 
     def draw(self, low: Array, high: Array) -> Array:
@@ -121,28 +132,31 @@ class EventPlant:
 
     # -- what is observed --------------------------------------------------------------------------
 
-    def case(self, samples: int, Ts: float) -> EventCase:
-        """A run whose sensors and inputs have clocks of their own, or are all read at once."""
-        clocks = self._clocks(samples, Ts)
-        times = np.unique(np.concatenate(clocks))[:samples]
-        reads = np.stack([np.isin(times, clock) for clock in clocks[: self.ny]], axis=1)
-        changes = np.isin(times, clocks[-1])
+    def case(self, samples: int, Ts: float, jitter: float = 0.0) -> EventCase:
+        """A run whose sensors and inputs have clocks of their own, or are all read at once.
+
+        Readings are taken up to ``jitter`` seconds before or after their stamps.
+        """
+        own = clocks(self.rng, self.ny, samples, Ts, (1.0, 2.0, 5.0))
+        times = np.unique(np.concatenate(own))[:samples]
+        reads = np.stack([np.isin(times, clock) for clock in own[: self.ny]], axis=1)
+        changes = np.isin(times, own[-1])
         inputs = np.array([self.rng.normal(size=self.nu) for _ in times])
         for k in range(1, len(times)):
             inputs[k] = inputs[k] if changes[k] else inputs[k - 1]
         way = self.way(times, inputs)
-        y = np.array([self.output(way, float(t)) + self.draw(-self.noise, self.noise) for t in times])
+        y = np.array([self._reading(way, float(t), jitter) for t in times])
         x = np.array([s.x for s in way[::PIECES]])
         first = HPolytope.box(x[0] - self.rng.uniform(0.0, 1.0, self.n), x[0] + self.rng.uniform(0.0, 1.0, self.n))
         log = Log(times, inputs, np.where(reads, y, np.nan), x=x)
-        return EventCase(self.model(Ts, self._reach(way), np.abs(inputs).max(axis=0)), log, first)
+        more = {"jitter": jitter} if jitter else {}
+        return EventCase(self.model(Ts, self._reach(way), np.abs(inputs).max(axis=0), **more), log, first)
 
-    def _clocks(self, samples: int, Ts: float) -> list[Array]:
-        """Times of each sensor, and those at which the input changes."""
-        steps = lambda mean: np.cumsum(mean * self.rng.uniform(1.0 - SPREAD, 1.0 + SPREAD, samples))  # noqa: E731
-        if self.rng.random() < 0.3:
-            return [steps(Ts)] * (self.ny + 1)
-        return [steps(Ts * self.rng.choice([1.0, 2.0, 5.0])) for _ in range(self.ny + 1)]
+    def _reading(self, way: list[Signals], stamp: float, jitter: float) -> Array:
+        """Each sensor at a time of its own."""
+        off = self.draw(np.full(self.ny, -jitter), np.full(self.ny, jitter))
+        values = [self.output(way, max(stamp + dt, way[0].time))[i] for i, dt in enumerate(off.tolist())]
+        return np.array(values) + self.draw(-self.noise, self.noise)
 
     def _reach(self, way: list[Signals]) -> Array:
         pairs = [(a, b.time - a.time) for a, b in pairwise(way)]

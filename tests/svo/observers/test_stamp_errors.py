@@ -1,0 +1,269 @@
+"""Readings whose time stamps are off by a stated bound."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from polytopes import HPolytope
+from svo import (
+    ArchitectureI,
+    ConstrainedZonotopeObserver,
+    Log,
+    NonlinearModel,
+    PolytopeObserver,
+    UncertainModel,
+    Uncertainty,
+    WindowObserver,
+    calibrate,
+    detect,
+    distinguishability,
+    verify,
+)
+from svo.logs.drive import drive
+from svo.models.nonlinear import Span
+from svo.models.stamps import StampErrors
+from svo.plant.description import read_description
+from tests.svo.observers.event_plants import EventCase, EventPlant
+from tests.svo.observers.nonlinear_events import nonlinear_case
+from tests.svo.observers.test_event_times import exclusions
+
+Array = NDArray[np.float64]
+CART: dict[str, Any] = {
+    "A": [[0.0, 1.0], [0.0, 0.0]], "B": [[0.0], [1.0]], "C": np.eye(2), "E": [[0.0], [1.0]], "w": [0.1],
+    "n": [0.01, 0.02], "Ts": 0.5,
+}  # fmt: skip
+FIRST = HPolytope.box([-1.0, -1.0], [1.0, 1.0])
+
+
+def cart(jitter: Any = 0.1, **more: Any) -> UncertainModel:
+    return UncertainModel.from_continuous(**CART | more, jitter=jitter)
+
+
+def missed(case: EventCase) -> tuple[int, int]:
+    return exclusions(WindowObserver(case.model, case.first), case.log)
+
+
+# -- soundness ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [0, 4, 7, 11])
+@pytest.mark.parametrize("jitter", [0.01, 0.3])
+def test_the_truth_is_inside_although_stamps_are_off(seed: int, jitter: float) -> None:
+    case = EventPlant(np.random.default_rng([18, seed])).case(30, 0.3, jitter)
+    assert missed(case) == (0, 0)
+
+
+def test_without_the_widening_the_truth_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(StampErrors, "widening", lambda self, *_: np.zeros(len(self.jitter)))
+    lost = [missed(EventPlant(np.random.default_rng([18, seed])).case(30, 0.3, 0.3)) != (0, 0) for seed in (0, 4, 7)]
+    assert all(lost)
+
+
+@pytest.mark.parametrize("name", ["pendulum", "tank"])
+def test_a_nonlinear_plant_whose_stamps_are_off(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = nonlinear_case(name, np.random.default_rng(9), 25, jitter=0.5)
+    assert missed(case) == (0, 0)
+    monkeypatch.setattr("svo.models.nonlinear.model.stamped", lambda flow, tape, output, *_: output)
+    assert missed(case) != (0, 0)
+
+
+def test_the_widening_is_what_the_output_can_change() -> None:
+    """Of a cart: J times the largest speed that it has within J, and J times the largest force."""
+    model = cart(jitter=[0.1, 0.3])
+    assert model.origin is not None
+    stamps = model.origin.stamps
+    assert stamps is not None
+    x, u = (np.array([0.0, 2.0]), np.array([5.0, 3.0])), (np.array([-1.0]), np.array([0.5]))
+    force = 1.0 + 0.1
+    expected = [0.1 * (3.0 + 0.1 * force), 0.3 * force]
+    np.testing.assert_allclose(stamps.widening(x, u, np.array([0.5])), expected, rtol=1e-8)
+    np.testing.assert_array_less(expected, stamps.widening(x, u, np.array([0.5])))
+
+
+def test_a_nonlinear_widening_is_that_of_the_same_linear_plant() -> None:
+    same = NonlinearModel(
+        lambda x, u, w: [x[1], u[0] + w[0]], lambda x: [x[0], x[1]], states=["p", "v"], inputs=["force"],
+        disturbances=["push"], Ts=0.5, n=[0.01, 0.02], w=[0.1], largest=([-9, -9], [9, 9]), jitter=[0.1, 0.3],
+    )  # fmt: skip
+    x, u = Span(np.array([0.0, 2.0]), np.array([5.0, 3.0])), (np.array([-1.0]), np.array([0.5]))
+    found = same.output_near(*x, np.array([0.5]), u)
+    np.testing.assert_allclose(found.R, [0.1 * (3.0 + 0.1 * 1.1), 0.3 * 1.1], rtol=1e-6)
+
+
+def test_a_feedthrough_is_that_of_either_input() -> None:
+    stamps = StampErrors(
+        UncertainModel(**CART | {"D": [[0.5], [0.0]], "A": np.zeros((2, 2)), "w": [0.0]}), np.array([1e-9, 0.0])
+    )
+    x = np.zeros(2), np.zeros(2)
+    found = stamps.widening(x, (np.array([-1.0]), np.array([3.0])), np.array([3.0]))
+    np.testing.assert_allclose(found, [0.5 * 4.0, 0.0], rtol=1e-6)
+
+
+# -- inputs about a reading ----------------------------------------------------------------------------------------
+
+
+def test_an_input_that_changes_soon_after_a_reading_is_an_error_that_leaves_the_observer_as_it_was() -> None:
+    observer, plain = (WindowObserver(cart(), FIRST) for _ in range(2))
+    for one in (observer, plain):
+        one.update([0.0, 0.0], u=[1.0])
+    with pytest.raises(ValueError, match=r"input changes 0\.05 s after a reading whose stamp is known to 0\.1 s"):
+        observer.step([1.0], [0.0, 0.0], u_next=[2.0], dt=0.05)
+    steps = [one.step([1.0], [0.0, 0.05], u_next=[1.0], dt=0.05) for one in (observer, plain)]
+    assert np.array_equal(steps[0].box, steps[1].box)
+    assert steps[0].verdict == "consistent"
+    with pytest.raises(ValueError, match="u_next is missing"):
+        observer.step([1.0], [0.0, 0.0])
+
+
+def test_a_log_goes_without_the_readings_that_may_be_of_another_input() -> None:
+    times = np.array([0.0, 0.3, 0.35, 0.9])
+    log = Log(times, np.array([[0.0], [0.0], [1e-3], [1e-3]]), np.zeros((4, 2)))
+    model = cart(jitter=[0.1, 0.01])
+    observer, other = WindowObserver(model, FIRST), WindowObserver(model, FIRST)
+    boxes = [np.array(step.box) for step in drive(observer, log)]
+    y = log.y.copy()
+    y[1, 0] = np.nan
+    assert [np.array(step.box).tobytes() for step in drive(other, replace(log, y=y))] == [b.tobytes() for b in boxes]
+    bank = ArchitectureI(WindowObserver(model, FIRST), {"free": WindowObserver(cart([0.1, 0.01], w=[0.5]), FIRST)})
+    assert bank.run(log).detected_at is None
+
+
+@pytest.mark.parametrize("kind", ["linear", "nonlinear"])
+def test_a_saved_state_goes_on_bit_for_bit(kind: str) -> None:
+    if kind == "linear":
+        case = EventPlant(np.random.default_rng([18, 4])).case(30, 0.3, 0.1)
+    else:
+        case = nonlinear_case("pendulum", np.random.default_rng(6), 30, jitter=0.4)
+    whole, cut = (WindowObserver(case.model, case.first) for _ in range(2))
+    boxes = [np.array(step.box).tobytes() for step in drive(whole, case.log)]
+    for _, step in zip(range(15), drive(cut, case.log), strict=False):
+        assert step.box is not None
+    for again in (deepcopy(cut), WindowObserver.from_state_dict(case.model, cut.state_dict())):
+        assert [np.array(step.box).tobytes() for step in drive(again, case.log, start=15)] == boxes[15:]
+    with pytest.raises(ValueError, match="another model"):
+        WindowObserver.from_state_dict(case.model.replace(n=2.0 * np.asarray(case.model.n)), cut.state_dict())
+
+
+def test_a_set_that_is_lost_has_no_reading_whose_stamp_is_off() -> None:
+    observer = WindowObserver(cart(jitter=[0.1, 0.0]), FIRST)
+    observer.lose_set()
+    verdicts = [step.verdict for step in drive(observer, Log(0.5 * np.arange(6), np.zeros((6, 1)), np.zeros((6, 2))))]
+    assert set(verdicts) == {"undecided"}  # the position is read by a sensor without a stamp of use
+    known = WindowObserver(cart(jitter=[0.1, 0.0], largest=([-9, -9], [9, 9])), FIRST)
+    known.lose_set()
+    assert known.run(Log(0.5 * np.arange(6), np.zeros((6, 1)), np.zeros((6, 2)))).verdicts[-1] == "consistent"
+
+
+# -- what is refused -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [ConstrainedZonotopeObserver, PolytopeObserver])
+def test_other_observers_take_exact_stamps(kind: Any) -> None:
+    with pytest.raises(ValueError, match="jitter, which only WindowObserver takes"):
+        kind(cart(), FIRST)
+
+
+def test_what_knows_nothing_of_stamps_refuses_them() -> None:
+    log = Log(0.5 * np.arange(3), np.zeros((3, 1)), np.zeros((3, 2)))
+    with pytest.raises(ValueError, match="jitter"):
+        calibrate(cart(), log, FIRST)
+    with pytest.raises(ValueError, match="jitter"):
+        distinguishability(cart(), cart(), 3, initial=FIRST)
+    with pytest.raises(ValueError, match="jitter needs the plant in continuous time"):
+        cart().replace(w=[0.2])
+    observer = WindowObserver(cart(), FIRST)
+    observer.update([np.nan, 0.0], u=[0.0])
+    with pytest.raises(ValueError, match="came late"):
+        observer.late_update([0.0, np.nan], 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"jitter": -1.0}, "jitter"),
+        ({"jitter": [0.1]}, "jitter"),
+        ({"jitter": np.nan}, "jitter"),
+        ({"uncertainties": [Uncertainty(C=np.ones((2, 2)), name="gain")]}, "gain is one number in 2 outputs"),
+        ({"C": [[1.0, 0.0]], "n": [0.0], "F": [[1.0]], "A": [[-1.0, 1.0], [0.0, -1.0]]}, "noise n above zero"),
+    ],
+)
+def test_stamps_that_cannot_be(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        WindowObserver(cart(**{"jitter": 0.1} | arguments), FIRST)
+
+
+# -- from a description to a proof -----------------------------------------------------------------------------------
+
+PLANT = """
+Ts = 0.5
+[columns]
+inputs = [{ name = "force", unit = "N" }]
+outputs = [{ name = "position", unit = "m" }, { name = "speed", unit = "m/s" }]
+[model]
+continuous = true
+jitter = %s
+A = [[0.0, 1.0], [0.0, 0.0]]
+B = [[0.0], [1.0]]
+E = [[0.0], [1.0]]
+C = [[1.0, 0.0], [0.0, 1.0]]
+n = [0.01, 0.02]
+w = [0.1]
+[initial]
+lower = [-1.0, -1.0]
+upper = [1.0, 1.0]
+[faults.motor]
+type = "actuator"
+input = "force"
+kind = "loss"
+magnitude = 1.0
+"""
+
+
+@pytest.mark.parametrize("stated", ["0.02", "[0.02, 0.02]"])
+def test_an_alarm_says_what_of_its_noise_is_not_checked_again(tmp_path: Path, stated: str) -> None:
+    (tmp_path / "cart.toml").write_text(PLANT % stated, encoding="utf-8")
+    plant = read_description(tmp_path / "cart.toml")
+    times, rng = 0.5 * np.arange(30), np.random.default_rng(0)
+    u, x, y = np.ones((30, 1)), np.zeros(2), []
+    for k in range(30):
+        y.append(x + rng.uniform(-1, 1, 2) * [0.01, 0.02])
+        force = u[k, 0] if k < 12 else 0.0
+        x = np.array([x[0] + 0.5 * x[1] + 0.125 * force, x[1] + 0.5 * force])
+    log = Log(times, u, np.array(y))
+    found = detect(plant, log)
+    assert found.fault == "motor"
+    checked = verify(found)
+    assert checked.ok, str(checked)
+    assert "widened enough for the stamps was proven when it was done" in str(checked)
+    whole = verify(found, full=True)
+    assert not whole.ok
+    assert "a model with jitter are not proven from the first sample on" in str(whole)
+
+
+def test_a_nonlinear_description_takes_jitter(tmp_path: Path) -> None:
+    text = """
+Ts = 0.5
+[columns]
+inputs = [{ name = "flow", unit = "m" }]
+outputs = [{ name = "level", unit = "m" }]
+[model]
+dynamics = { h = "flow - sqrt(h)" }
+outputs = { level = "h" }
+n = [0.01]
+jitter = 0.05
+physical = { lower = [0.0], upper = [9.0] }
+[initial]
+lower = [0.9]
+upper = [1.1]
+"""
+    (tmp_path / "tank.toml").write_text(text, encoding="utf-8")
+    model = read_description(tmp_path / "tank.toml").model
+    assert model.jitter is not None
+    assert model.jitter.tolist() == [0.05]
