@@ -8,10 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from svo.checks import Array
+from svo.models.bounds import Bounds
 from svo.models.model import UncertainModel
 from svo.models.nonlinear.flow import Flow
 from svo.models.nonlinear.output import LinearOutput
 from svo.models.nonlinear.transition import Transition
+from svo.models.stack import Stack
+
+_ROUNDED_UP = 1.0 + 2.0**-50
 
 
 class Linearisation(NamedTuple):
@@ -19,34 +23,89 @@ class Linearisation(NamedTuple):
 
     Attributes
     ----------
-    A, a, E : (n, n), (n,), (n, nw + n) arrays
-        The last n columns of E are the remainder of each state.
-    C, c, F, n : (ny, n), (ny,), (ny, nw + n), (ny,) arrays
+    rows : (n + ny, n + 1 + nw + n) array
+        [[A, a, E], [C, c, F]]; the last n columns of E are the remainder of each state.
+    n : (ny,) array
     """
 
-    A: Array
-    a: Array
-    E: Array
-    C: Array
-    c: Array
-    F: Array
+    rows: Array
     n: Array
+
+    @classmethod
+    def of(cls, A: Array, a: Array, E: Array, C: Array, c: Array, F: Array, n: Array) -> Linearisation:
+        """From its blocks: (n, n), (n,), (n, nw + n), (ny, n), (ny,), (ny, nw + n) and (ny,) arrays."""
+        return cls(np.block([[A, a[:, None], E], [C, c[:, None], F]]), n)
 
     @classmethod
     def before(cls, reading: LinearOutput, noise: Array) -> Linearisation:
         """Of a sample from which no transition is known yet."""
-        width = (noise + reading.R) * (1.0 + 4.0 * np.finfo(float).eps)
-        return cls.measured(reading.C, reading.c, np.hstack([reading.F, np.zeros(reading.C.shape)]), width)
+        (ny, n), nw = reading.C.shape, reading.F.shape[1]
+        rows = np.zeros((n + ny, 2 * n + 1 + nw))
+        rows[:n, :n].flat[:: n + 1] = 1.0
+        rows[n:, :n], rows[n:, n], rows[n:, n + 1 : n + 1 + nw] = reading.C, reading.c, reading.F
+        return cls(rows, (noise + reading.R) * _ROUNDED_UP)
 
     @classmethod
     def measured(cls, C: Array, c: Array, F: Array, n: Array) -> Linearisation:
         """Of a sample of which only the measurement is known."""
         size = C.shape[1]
-        return cls(np.eye(size), np.zeros(size), np.zeros((size, F.shape[1])), C, c, F, n)
+        return cls.of(np.eye(size), np.zeros(size), np.zeros((size, F.shape[1])), C, c, F, n)
 
     def moved(self, found: Transition) -> Linearisation:
         """The same sample with the transition from it."""
-        return self._replace(A=found.A, a=found.a, E=np.hstack([found.E, np.diag(found.R)]))
+        n, rows = len(found.R), self.rows.copy()
+        rows[:n, :n], rows[:n, n], rows[:n, n + 1 : -n] = found.A, found.a, found.E
+        rows[:n, -n:].flat[:: n + 1] = found.R
+        return Linearisation(rows, self.n)
+
+    def stack(self, nu: int) -> Array:
+        """The rows as a stack (1, n + ny, n + nu + 1 + nw + n), with zeros for the inputs."""
+        n, (count, columns) = self._states, self.rows.shape
+        stack = np.zeros((1, count, columns + nu))
+        stack[0, :, :n], stack[0, :, n + nu :] = self.rows[:, :n], self.rows[:, n:]
+        return stack
+
+    @property
+    def _states(self) -> int:
+        return len(self.rows) - len(self.n)
+
+    @property
+    def A(self) -> Array:
+        return self.rows[: self._states, : self._states]
+
+    @property
+    def a(self) -> Array:
+        return self.rows[: self._states, self._states]
+
+    @property
+    def E(self) -> Array:
+        return self.rows[: self._states, self._states + 1 :]
+
+    @property
+    def C(self) -> Array:
+        return self.rows[self._states :, : self._states]
+
+    @property
+    def c(self) -> Array:
+        return self.rows[self._states :, self._states]
+
+    @property
+    def F(self) -> Array:
+        return self.rows[self._states :, self._states + 1 :]
+
+
+class _LinearisedStack(Stack):
+    """A stack that a linearisation has ready."""
+
+    def at(self, schedule: Any) -> Array:
+        return schedule.stack(self.layout.nu)
+
+
+class _LinearisedBounds(Bounds):
+    """Bounds of which only the noise is the linearisation's."""
+
+    def at(self, schedule: Any) -> tuple[Array, Array, Array]:
+        return self.lower, self.upper, schedule.n
 
 
 def carrier_of(
@@ -58,11 +117,15 @@ def carrier_of(
     """
     n, ny, columns = flow.n, len(noise), len(flow.varying) + flow.n
     state, output = (np.ones((n, n)), np.ones(n), np.ones((n, columns))), (np.ones((ny, n)), np.ones(ny))
-    typical = Linearisation(*state, *output, np.ones((ny, columns)), noise)
+    typical = Linearisation.of(*state, *output, np.ones((ny, columns)), noise)
     unit = np.ones(n)
-    return UncertainModel(
+    found = UncertainModel(
         attrgetter("A"), np.zeros((n, nu)), attrgetter("C"), a=attrgetter("a"), E=attrgetter("E"), c=attrgetter("c"),
         F=attrgetter("F") if is_disturbed else None,
         n=attrgetter("n"), w=(np.concatenate([flow.w.lower, -unit]), np.concatenate([flow.w.upper, unit])), Ts=Ts,
         physical=physical, largest=largest, schedule=typical,
     )  # fmt: skip
+    stack, bounds = found._stack, found._bounds
+    object.__setattr__(found, "_stack", _LinearisedStack(stack.layout, stack.constant, stack.scheduled))
+    object.__setattr__(found, "_bounds", _LinearisedBounds(*bounds.edges, bounds.nw, bounds.ny))
+    return found

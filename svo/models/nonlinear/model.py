@@ -326,7 +326,8 @@ class NonlinearModel(Value, Shown):
 
     def _box(self, lower: ArrayLike, upper: ArrayLike) -> Span:
         box = Span(*(finite_array(n, v, (self.n_states,)) for n, v in (("lower", lower), ("upper", upper))))
-        expect((box.lower <= box.upper).all(), "lower", box.lower, f"bounds not above upper = {box.upper}")
+        if not (box.lower <= box.upper).all():
+            raise ValueError(f"lower is {box.lower}; expected bounds not above upper = {box.upper}")
         return box
 
     # -- simulation ------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ class Relinearised:
         if not (lower <= upper).all():  # only the window's programs raise an alarm
             lower, upper = known
         assert self.now is not None
-        found = self.model.transition(lower, upper, u, dt=dt)
+        found = self.model.kernel.transition(lower, upper, u, dt or self.model.Ts)
         self.box = found.box
         self.before = self.now.moved(found)
         return self.before
