@@ -9,10 +9,14 @@
 #include "vectors.h"
 
 static const double ROUNDED = 0.51 * EPS; /* a rounding, and what its bound is rounded by */
-static const double LAST = 0x1p-100;      /* scaled norm of the first term left out: units are 1e-12 of a state or more */
-static const double TAIL = 3.0;           /* of that norm: all terms left out, the next at most half of each */
+static const double LAST = 0x1p-64;       /* first term left out: of the units, and of a rounding of all that it moves */
+static const double TAIL = 3.0;           /* of it: all terms left out, the next at most half of each */
 static const double VANISHED = 0x1p-1074; /* what a product that is no normal double loses */
-static const integer MOST_TERMS = 40;     /* 1 / 31! is below LAST */
+static const integer MOST_TERMS = 40;
+
+/* One entry of the matrices J, |J| and M, side by side so that their products are vectors. */
+enum { OF_J, OF_SIZE, OF_M, LANES = 4 };
+typedef struct { double of[LANES]; } entry;
 
 exponential exponential_in(Memory *memory, integer n)
 {
@@ -22,79 +26,83 @@ exponential exponential_in(Memory *memory, integer n)
     return e;
 }
 
-static void identity(double *matrix, double value, integer n)
+/* Doubles of scratch that one needs. */
+EXPORTED integer fdi_exponential_room(integer n) { return 4 * LANES * n * n + LANES * n; }
+
+static entry *entries(Memory *memory, integer count) { return (entry *)(void *)doubles(memory, LANES * count); }
+
+static void identity(entry *matrix, double value, integer n)
 {
-    fill(matrix, 0.0, n * n);
-    for (integer i = 0; i < n; i++) matrix[i * n + i] = value;
+    fill((double *)(void *)matrix, 0.0, LANES * n * n);
+    for (integer i = 0; i < n; i++)
+        for (int lane = 0; lane < LANES; lane++) matrix[i * n + i].of[lane] = value;
 }
 
 /* term = term M factor */
-static void times(double *term, const double *M, double factor, double *row, integer n)
+static void times(entry *restrict term, const entry *restrict M, double factor, entry *restrict row, integer n)
 {
     for (integer i = 0; i < n; i++) {
-        fill(row, 0.0, n);
-        for (integer k = 0; k < n; k++)
-            if (term[i * n + k] != 0.0) add_multiple(row, term[i * n + k], M + k * n, n);
-        for (integer j = 0; j < n; j++) term[i * n + j] = row[j] * factor;
+        for (integer j = 0; j < n; j++) {
+            entry sum = {{0.0, 0.0, 0.0, 0.0}};
+            for (integer k = 0; k < n; k++)
+                for (int lane = 0; lane < LANES; lane++) sum.of[lane] += term[i * n + k].of[lane] * M[k * n + j].of[lane];
+            row[j] = sum;
+        }
+        for (integer j = 0; j < n; j++)
+            for (int lane = 0; lane < LANES; lane++) term[i * n + j].of[lane] = row[j].of[lane] * factor;
     }
 }
 
-/* Doubles of scratch that one needs. */
-EXPORTED integer fdi_exponential_room(integer n) { return 7 * n * n + n; }
-
-void exponential_take(integer n, const double *J, double h, const double *unit, double norm, Memory scratch,
-                      exponential *e)
+void exponential_take(integer n, const double *J, double h, const double *unit, double norm, double reach,
+                      Memory scratch, exponential *e)
 {
     const integer nn = n * n;
-    double *A = doubles(&scratch, nn), *M = doubles(&scratch, nn), *row = doubles(&scratch, n);
-    double *T = doubles(&scratch, nn), *N = doubles(&scratch, nn), *S = doubles(&scratch, nn);
-    double *P = e->move, *G = e->gain, *C = e->carried, *lost = e->move_error, *lost_in_gain = e->gain_error;
-    double *X = doubles(&scratch, nn), *XG = doubles(&scratch, nn);
-    int is_metzler = 1;
+    entry *M = entries(&scratch, nn), *T = entries(&scratch, nn), *row = entries(&scratch, n);
+    entry *P = entries(&scratch, nn), *G = entries(&scratch, nn);
+    double *lost = e->move_error, *lost_in_gain = e->gain_error;
     for (integer i = 0; i < nn; i++) {
-        A[i] = fabs(J[i]);
-        M[i] = i % (n + 1) == 0 ? J[i] : A[i];
-        is_metzler &= M[i] == J[i];
+        const double size = fabs(J[i]);
+        M[i] = (entry){{J[i], size, i % (n + 1) == 0 ? J[i] : size, 0.0}};
     }
-    identity(T, 1.0, n), identity(N, 1.0, n), identity(S, 1.0, n), identity(P, 1.0, n), identity(X, 1.0, n);
-    identity(G, h, n), identity(C, h, n), identity(XG, h, n);
+    identity(T, 1.0, n), identity(P, 1.0, n), identity(G, h, n);
     fill(lost, 0.0, nn), fill(lost_in_gain, 0.0, nn);
-    double left = norm * (1.0 + (double)(n + 8) * EPS); /* scaled norm of the next term */
-    const double first = left;
+    const double first = norm * (1.0 + (double)(n + 8) * EPS), last = LAST / larger(reach, 1.0);
+    double left = first; /* scaled norm of the next term */
     integer terms = 0;
-    while (left > LAST && terms < MOST_TERMS) {
+    while (left > last && terms < MOST_TERMS) {
         const double k = (double)++terms, share = h / (k + 1.0), rounds = (double)(n + 3) * k;
-        times(T, J, h / k, row, n);
-        times(N, A, h / k, row, n);
-        if (!is_metzler) times(S, M, h / k, row, n);
+        times(T, M, h / k, row, n);
         for (integer i = 0; i < nn; i++) {
-            P[i] += T[i], X[i] += N[i], lost[i] += rounds * N[i];
-            G[i] += T[i] * share, XG[i] += N[i] * share, lost_in_gain[i] += rounds * (N[i] * share);
-            if (!is_metzler) C[i] += S[i] * share;
+            for (int lane = 0; lane < LANES; lane++) {
+                P[i].of[lane] += T[i].of[lane];
+                G[i].of[lane] += T[i].of[lane] * share;
+            }
+            lost[i] += rounds * T[i].of[OF_SIZE];
+            lost_in_gain[i] += rounds * (T[i].of[OF_SIZE] * share);
         }
         left *= first / (k + 1.0);
     }
-    if (is_metzler) copy(C, G, nn);
     const double sums = (double)(terms + 5);
     for (integer j = 0; j < n; j++) {
         double column = 0.0;
-        for (integer i = 0; i < n; i++) column += X[i * n + j];
+        for (integer i = 0; i < n; i++) column += P[i * n + j].of[OF_SIZE];
         const double vanished = (double)(MOST_TERMS * (n + 4)) * VANISHED * (1.0 + 2.0 * column);
         for (integer i = 0; i < n; i++) {
             const integer at = i * n + j;
             const double tail = TAIL * left * (unit[i] / unit[j]) + vanished;
-            lost[at] = ROUNDED * (lost[at] + sums * X[at]) + tail;
-            lost_in_gain[at] = ROUNDED * (lost_in_gain[at] + sums * XG[at]) + tail * h + vanished;
-            C[at] = larger(0.0, (C[at] + lost_in_gain[at]) * (1.0 + EPS));
+            e->move[at] = P[at].of[OF_J], e->gain[at] = G[at].of[OF_J];
+            lost[at] = ROUNDED * (lost[at] + sums * P[at].of[OF_SIZE]) + tail;
+            lost_in_gain[at] = ROUNDED * (lost_in_gain[at] + sums * G[at].of[OF_SIZE]) + tail * h + vanished;
+            e->carried[at] = larger(0.0, (G[at].of[OF_M] + lost_in_gain[at]) * (1.0 + EPS));
         }
     }
 }
 
 /* The same, to be held against balls: result (5, n, n) as `exponential` lists it. */
-EXPORTED void fdi_exponential(integer n, const double *J, double h, const double *unit, double norm, double *scratch,
-                              double *result)
+EXPORTED void fdi_exponential(integer n, const double *J, double h, const double *unit, double norm, double reach,
+                              double *scratch, double *result)
 {
     const integer nn = n * n;
     exponential e = {result, result + nn, result + 2 * nn, result + 3 * nn, result + 4 * nn};
-    exponential_take(n, J, h, unit, norm, (Memory){scratch, 0}, &e);
+    exponential_take(n, J, h, unit, norm, reach, (Memory){scratch, 0}, &e);
 }

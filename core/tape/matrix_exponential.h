@@ -11,8 +11,9 @@ typedef struct { double *move, *gain, *move_error, *gain_error, *carried; } expo
 integer fdi_exponential_room(integer n);
 exponential exponential_in(Memory *memory, integer n);
 
-/* Of J whose scaled norm max_i sum_j |J_ij| unit_j / unit_i h is at most 1, for powers of two `unit`. */
-void exponential_take(integer n, const double *J, double h, const double *unit, double norm, Memory scratch,
+/* Of J whose scaled norm max_i sum_j |J_ij| unit_j / unit_i h is at most 1, for powers of two `unit`;
+ * what it moves is at most `reach` units. */
+void exponential_take(integer n, const double *J, double h, const double *unit, double norm, double reach, Memory scratch,
                       exponential *e);
 
 #endif

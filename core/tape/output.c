@@ -125,13 +125,28 @@ EXPORTED integer fdi_plant_cut(const double *block, double *scratch, double *low
     return 1;
 }
 
-/* An output over the set that is known, which the readings y cut: low and high are given back. Again over what is left while the remainder blurs the readings. Returns whether h has no form. */
+/* Into the rows [C, c, F, 0] of a sample's linearisation, and the noise with the remainder. */
+static void give_rows(const plant *p, const output *o, double *rows, double *noise)
+{
+    const integer n = p->n, nw = p->nw;
+    for (integer i = 0; i < p->ny; i++, rows += 2 * n + 1 + nw) {
+        copy(rows, o->C + i * n, n);
+        rows[n] = o->c[i];
+        copy(rows + n + 1, o->F + i * nw, nw);
+        fill(rows + n + 1 + nw, 0.0, n);
+        noise[i] = (p->noise[i] + o->R[i]) * (1.0 + 4.0 * ROUNDING);
+    }
+}
+
+/* An output over the set that is known, which the readings y cut: low and high are given back. Again over what is left
+ * while the remainder blurs the readings. The rows (ny, 2 n + 1 + nw) of a linearisation, and its noise (ny). Returns
+ * whether h has no form. */
 EXPORTED integer fdi_plant_measured(const double *block, double *scratch, double *low, double *high, const double *y,
-                                    const double *u, double *result, outcome *found)
+                                    const double *u, double *rows, double *noise, outcome *found)
 {
     plant p;
     plant_open(&p, block, (Memory){scratch, 0});
-    output o = output_at(&p, result);
+    output o = output_at(&p, doubles(&p.rest, p.ny * (p.n + p.nw + 2)));
     double *before = doubles(&p.rest, p.ny);
     const span known = {low, high};
     plant_hold(&p, u);
@@ -143,5 +158,6 @@ EXPORTED integer fdi_plant_measured(const double *block, double *scratch, double
         span_copy(known, p.z, p.n);
         if (!is_worth_another(&p, &o, before)) break;
     }
+    give_rows(&p, &o, rows, noise);
     return 0;
 }

@@ -72,6 +72,14 @@ static double scaled_norm(const plant *p, double h, double *moved, local *d)
     return norm;
 }
 
+/* How many units the largest state is away from zero. */
+static double reach_in_units(const plant *p, const local *d)
+{
+    double reach = 0.0;
+    for (integer i = 0; i < p->n; i++) reach = larger(largest_of(p->z, i) / d->unit[i], reach);
+    return reach;
+}
+
 static void take_local(const plant *p, local *d)
 {
     const integer n = p->n, nw = p->nw;
@@ -200,7 +208,7 @@ static int move(plant *p, double T, integer least_substeps, transition *t, trans
         if (is_enclosed && norm <= 1.0) {
             if (!is_valid(p, p->z, found)) return 0;
             take_local(p, &d);
-            exponential_take(p->n, d.J, h, d.unit, norm, scratch, &e);
+            exponential_take(p->n, d.J, h, d.unit, norm, reach_in_units(p, &d), scratch, &e);
             if (!advance(p, now, &d, &e, h, next, found)) return 0;
             transition *last = now;
             now = next, next = last, done += size;
@@ -300,7 +308,33 @@ EXPORTED integer fdi_plant_room(const double *block)
     all_in(&p, &other, &finer);
     local_in(&p.rest, &p);
     exponential_in(&p.rest, p.n);
-    return p.rest.used + fdi_exponential_room(p.n) + p.ny;
+    return p.rest.used + fdi_exponential_room(p.n) + p.ny * (p.n + p.nw + 3); /* the last, what a measurement needs */
+}
+
+/* Over a time T from t->start, in the way that the plant has; as what `move` returns. */
+static int take(plant *p, double T, transition *t, transition *other, transition *finer, outcome *found)
+{
+    cut_by_physical(p, t->start);
+    if (!(p->continuous ? move_well(p, T, t, other, finer, p->rest, found) : map(p, t, found))) return 0;
+    for (integer i = 0; i < p->n; i++)
+        if (!(t->R[i] <= p->largest[i])) {
+            *found = (outcome){.code = TOO_WIDE, .row = i};
+            return 0;
+        }
+    return 1;
+}
+
+/* Into the rows [A, a, E, diag R] of a sample's linearisation. */
+static void give_rows(const plant *p, const transition *t, double *rows)
+{
+    const integer n = p->n, nw = p->nw;
+    for (integer i = 0; i < n; i++, rows += 2 * n + 1 + nw) {
+        copy(rows, t->A + i * n, n);
+        rows[n] = t->a[i];
+        copy(rows + n + 1, t->E + i * nw, nw);
+        fill(rows + n + 1 + nw, 0.0, n);
+        rows[n + 1 + nw + i] = t->R[i];
+    }
 }
 
 /* The transition over a time T of all states between low and high (n): A, a, E, R, the bounds of x+ and of the state on
@@ -315,14 +349,35 @@ EXPORTED integer fdi_plant_transition(const double *block, double *scratch, cons
     plant_hold(&p, u);
     copy(t.start.low, low, p.n);
     copy(t.start.high, high, p.n);
-    cut_by_physical(&p, t.start);
-    const int is_done = p.continuous ? move_well(&p, T, &t, &other, &finer, p.rest, found) : map(&p, &t, found);
-    if (!is_done) return -found->code;
-    for (integer i = 0; i < p.n; i++)
-        if (!(t.R[i] <= p.largest[i])) {
-            *found = (outcome){.code = TOO_WIDE, .row = i};
-            return -found->code;
-        }
+    if (!take(&p, T, &t, &other, &finer, found)) return -found->code;
     give(&p, &t, result);
     return t.substeps;
+}
+
+/* The same from the states that are known (n) in two ways, where these have a common one, else from the first: only the
+ * window's programs raise an alarm. The state's rows of a linearisation (n, 2 n + 1 + nw), and bounds of x+ in the place
+ * of the second. Returns 0, or the code of what came of it. */
+EXPORTED integer fdi_plant_moved(const double *block, double *scratch, const double *known_low,
+                                 const double *known_high, double *low, double *high, const double *u, double T,
+                                 double *rows, outcome *found)
+{
+    plant p;
+    transition other, finer;
+    plant_open(&p, block, (Memory){scratch, 0});
+    transition t = all_in(&p, &other, &finer);
+    int meets = 1;
+    plant_hold(&p, u);
+    for (integer i = 0; i < p.n; i++) {
+        t.start.low[i] = larger(known_low[i], low[i]), t.start.high[i] = smaller(known_high[i], high[i]);
+        meets &= t.start.low[i] <= t.start.high[i];
+    }
+    if (!meets) {
+        copy(t.start.low, known_low, p.n);
+        copy(t.start.high, known_high, p.n);
+    }
+    if (!take(&p, T, &t, &other, &finer, found)) return found->code;
+    give_rows(&p, &t, rows);
+    copy(low, t.box.low, p.n);
+    copy(high, t.box.high, p.n);
+    return 0;
 }

@@ -12,10 +12,7 @@ from svo.models.bounds import Bounds
 from svo.models.model import UncertainModel
 from svo.models.nonlinear.flow import Flow
 from svo.models.nonlinear.output import LinearOutput
-from svo.models.nonlinear.transition import Transition
 from svo.models.stack import Stack
-
-_ROUNDED_UP = 1.0 + 2.0**-50
 
 
 class Linearisation(NamedTuple):
@@ -37,13 +34,11 @@ class Linearisation(NamedTuple):
         return cls(np.block([[A, a[:, None], E], [C, c[:, None], F]]), n)
 
     @classmethod
-    def before(cls, reading: LinearOutput, noise: Array) -> Linearisation:
-        """Of a sample from which no transition is known yet."""
-        (ny, n), nw = reading.C.shape, reading.F.shape[1]
+    def empty(cls, n: int, nw: int, ny: int) -> Linearisation:
+        """Of a sample from which no transition is known, and of which nothing is measured."""
         rows = np.zeros((n + ny, 2 * n + 1 + nw))
         rows[:n, :n].flat[:: n + 1] = 1.0
-        rows[n:, :n], rows[n:, n], rows[n:, n + 1 : n + 1 + nw] = reading.C, reading.c, reading.F
-        return cls(rows, (noise + reading.R) * _ROUNDED_UP)
+        return cls(rows, np.zeros(ny))
 
     @classmethod
     def measured(cls, C: Array, c: Array, F: Array, n: Array) -> Linearisation:
@@ -51,12 +46,11 @@ class Linearisation(NamedTuple):
         size = C.shape[1]
         return cls.of(np.eye(size), np.zeros(size), np.zeros((size, F.shape[1])), C, c, F, n)
 
-    def moved(self, found: Transition) -> Linearisation:
-        """The same sample with the transition from it."""
-        n, rows = len(found.R), self.rows.copy()
-        rows[:n, :n], rows[:n, n], rows[:n, n + 1 : -n] = found.A, found.a, found.E
-        rows[:n, -n:].flat[:: n + 1] = found.R
-        return Linearisation(rows, self.n)
+    @classmethod
+    def before(cls, output: LinearOutput, noise: Array) -> Linearisation:
+        """Of a sample from which no transition is known yet."""
+        F = np.hstack([output.F, np.zeros_like(output.C)])
+        return cls.measured(output.C, output.c, F, (noise + output.R) * (1.0 + 2.0**-50))
 
     def stack(self, nu: int) -> Array:
         """The rows as a stack (1, n + ny, n + nu + 1 + nw + n), with zeros for the inputs."""

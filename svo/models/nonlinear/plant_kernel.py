@@ -12,6 +12,7 @@ from polytopes.native import Address, Entries, Given, Integer, Real
 from svo.checks import Array
 from svo.functions.tape import Tape
 from svo.functions.tape_kernel import why_not
+from svo.models.nonlinear.carrier import Linearisation
 from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput
 from svo.models.nonlinear.transition import Transition
@@ -24,7 +25,10 @@ _transition = native.function(
 _output = native.function("fdi_plant_output", Address, Address, *[Given] * 3, Entries, Entries, returns=Integer)
 _cut = native.function("fdi_plant_cut", Address, Address, *[Entries] * 2, Given, Entries, returns=Integer)
 _measured = native.function(
-    "fdi_plant_measured", Address, Address, *[Entries] * 2, *[Given] * 2, Entries, Entries, returns=Integer
+    "fdi_plant_measured", Address, Address, *[Entries] * 2, *[Given] * 2, *[Entries] * 3, returns=Integer
+)
+_moved = native.function(
+    "fdi_plant_moved", Address, Address, *[Given] * 2, *[Entries] * 2, Given, Real, *[Entries] * 2, returns=Integer
 )
 
 # As in `core/tape/plant.h`.
@@ -115,19 +119,38 @@ class PlantKernel:
             raise self._undecided(told, is_output=True)
         return self._linear(result)
 
-    def measured(self, known: Span, y: Array, u: Array) -> tuple[LinearOutput, Span]:
-        """Of all states of a box, which readings y (ny,), NaN where there is none, cut; and what they leave of it.
+    def measured(self, known: Span, y: Array, u: Array) -> tuple[Linearisation, Span]:
+        """The output of all states of a box, as a sample that nothing follows yet, and what its readings leave.
+
+        Again over what is left while the remainder blurs the readings y (ny,), NaN where there is none.
 
         Raises
         ------
         Undecided
             If it is not enclosed.
         """
-        result, told = self._result()
+        found, told = Linearisation.empty(*self._sizes), np.empty(8)
         left = Span(known.lower.copy(), known.upper.copy())
-        if _measured(self._address, native.scratch(self._room), *left, y, u, result, told):
+        n = self._sizes[0]
+        if _measured(self._address, native.scratch(self._room), *left, y, u, found.rows[n:], found.n, told):
             raise self._undecided(told, is_output=True)
-        return self._linear(result), left
+        return found, left
+
+    def moved(self, at: Linearisation, known: Span, box: Span, u: Array, T: float) -> tuple[Linearisation, Span]:
+        """A sample with the transition from it, over a time T, and bounds of the next state.
+
+        From the states that are in both boxes; in the first, if none is in both: only the window's programs raise an
+        alarm.
+
+        Raises
+        ------
+        Undecided
+            As `transition`.
+        """
+        rows, left, told = at.rows.copy(), Span(box.lower.copy(), box.upper.copy()), np.empty(8)
+        if _moved(self._address, native.scratch(self._room), *known, *left, u, T, rows, told):
+            raise self._undecided(told)
+        return Linearisation(rows, at.n), left
 
     def cut(self, known: Span, y: Array, output: LinearOutput) -> Span | None:
         """What readings leave of a box for which an output holds; None where nothing is left: a program decides."""

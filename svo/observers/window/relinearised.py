@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.models.nonlinear import Linearisation, LinearOutput, NonlinearModel, Span, Undecided
+from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
 from svo.observers.saved_state import numbers
 
 _MEASURED = ("C", "c", "F", "n")  # what a sample has without a transition
@@ -61,13 +61,9 @@ class Relinearised:
             As `NonlinearModel.transition`.
         """
         self.reason = None
-        lower, upper = np.maximum(known.lower, self.box.lower), np.minimum(known.upper, self.box.upper)
-        if not (lower <= upper).all():  # only the window's programs raise an alarm
-            lower, upper = known
         assert self.now is not None
-        found = self.model.kernel.transition(lower, upper, u, dt or self.model.Ts)
-        self.box = found.box
-        self.before = self.now.moved(found)
+        kernel, T = self.model.kernel, dt or self.model.Ts
+        self.before, self.box = kernel.moved(self.now, known, self.box, u, T)
         return self.before
 
     def give_up(self, why: Undecided, sample: int) -> Span:
@@ -84,19 +80,17 @@ class Relinearised:
         model = self.model
         try:
             if around is None:
-                output, self.box = model.kernel.measured(self.box, y, u)
+                self.now, self.box = model.kernel.measured(self.box, y, u)
             else:
-                output, self.box = self._near(y, u, around)
+                self.now, self.box = self._near(y, u, around)
         except Undecided as error:
             self.reason = self.reason or f"{OUTSIDE_MODEL}: at sample {sample}, {error}"
-            nothing = [np.zeros((len(y), size)) for size in (model.n_states, len(model.flow.varying))]
-            output = LinearOutput(nothing[0], np.zeros(len(y)), nothing[1], np.zeros(len(y)))
-            y = np.full(len(y), np.nan)
-        self.now = Linearisation.before(output, model.noise)
+            nothing = Linearisation.empty(model.n_states, len(model.flow.varying), len(y))
+            self.now, y = Linearisation(nothing.rows, model.noise), np.full(len(y), np.nan)
         return self.now, y
 
-    def _near(self, y: Array, u: Array, around: tuple[Array, Array]) -> tuple[LinearOutput, Span]:
-        """The output where readings may be of other instants, about which inputs are within ``around``, and its box.
+    def _near(self, y: Array, u: Array, around: tuple[Array, Array]) -> tuple[Linearisation, Span]:
+        """The sample where readings may be of other instants, about which inputs are within ``around``, and its box.
 
         Once more over what the readings leave, which narrows what may happen meanwhile.
         """
@@ -104,7 +98,7 @@ class Relinearised:
         for _ in range(2):
             output = model.output_near(*box, u, around)
             box = model.kernel.cut(box, y, output) or box
-        return output, box
+        return Linearisation.before(output, model.noise), box
 
     # -- saved states ------------------------------------------------------------------------------------
 

@@ -15,10 +15,11 @@ from svo.checks import Array
 from tests.svo.functions.oracle.exponential import carried
 
 CASES = 150
+REACH = 2.0**36  # units that a state is away from zero: a trillion times as wide as the set is about the most
 _room = native.function("fdi_exponential_room", native.Integer, returns=native.Integer)
 _take = native.function(
-    "fdi_exponential", native.Integer, native.Given, native.Real, native.Given, native.Real, native.Address,
-    native.Entries,
+    "fdi_exponential", native.Integer, native.Given, native.Real, native.Given, native.Real, native.Real,
+    native.Address, native.Entries,
 )  # fmt: skip
 
 
@@ -38,7 +39,7 @@ def draw(rng: np.random.Generator) -> tuple[Array, float, Array, float]:
 def taken(J: Array, h: float, unit: Array, norm: float) -> Array:
     n = len(J)
     found = np.empty((5, n, n))
-    _take(n, J, h, unit, norm, native.scratch(_room(n)), found)
+    _take(n, J, h, unit, norm, REACH, native.scratch(_room(n)), found)
     return found
 
 
