@@ -5,7 +5,13 @@
 #ifndef PAIRS_H
 #define PAIRS_H
 
+#include <float.h>
+
 #include "core.h"
+
+#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD == 2 || FLT_EVAL_METHOD < 0)
+#error "these sums are exact only where doubles are computed in double precision"
+#endif
 
 typedef struct {
     double value, rest;
