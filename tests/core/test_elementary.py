@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 
-from svo.functions import intervals
 from tests.core.compiler import CORE
 from tests.core.elementary_in_balls import (
     AT,
@@ -28,6 +27,7 @@ from tests.core.elementary_in_balls import (
     nearest_to_quarter_turns,
     steps_between,
 )
+from tests.svo.functions.oracle import intervals
 
 INF = math.inf
 TINY = 5e-324
