@@ -1,6 +1,6 @@
 """Nonlinear examples whose results CORA prints, with the same bounds, inputs and readings: widths side by side.
 
-Run with ``python -m benchmarks.published_nonlinear``; half a minute of CPU. One is an estimation from readings; in the
+Run with ``python -m benchmarks.published_nonlinear``; some seconds of CPU. One is an estimation from readings; in the
 others nothing is read, which leaves the prediction alone. CORA prints no times. `docs/benchmarks.md` says what differs.
 """
 

@@ -127,7 +127,7 @@ def main() -> None:
     logs = records(folder)
     first, second = halves(logs["normal"])
     shown, bounds = measured(first), learnt(first)
-    rows = [[*pair] for pair in zip(("level [cm]", "rate [cm/s]", "flow [cm^3/s]"), shown, bounds, strict=True)]
+    rows = [[*pair] for pair in zip(("level, cm", "rate, cm/s", "flow, cm^3/s"), shown, bounds, strict=True)]
     table("First half of the healthy record", ["", "shown", "bound"], [[a, f"{b:.3g}", f"{c:.3g}"] for a, b, c in rows])
     runs = [("second half, healthy", part(second, 0, chosen.healthy))] + [(name, logs[name]) for name in FAULTS]
     pairs = [(name, log, with_flow) for name, log in runs for with_flow in (False, True)]
