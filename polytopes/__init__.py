@@ -1,7 +1,9 @@
 """Set algebra of polyhedra ``{x : A x <= b, C x = d}`` with certified emptiness.  Knows nothing of dynamics."""
 
+from polytopes.approximation import Bracketed, Copy
 from polytopes.certificate import Certificate
 from polytopes.containment import Containment
+from polytopes.directions import box_directions, eigenvector_directions, octagon_directions, sphere_directions
 from polytopes.distance import Distance
 from polytopes.ellipsoids import Ellipsoid
 from polytopes.emptiness import Emptiness
@@ -19,9 +21,11 @@ from polytopes.unions import convex_hull, union_bounds
 
 __all__ = [
     "Ball",
+    "Bracketed",
     "Certificate",
     "Chord",
     "Containment",
+    "Copy",
     "Distance",
     "Ellipsoid",
     "Emptiness",
@@ -37,7 +41,11 @@ __all__ = [
     "UnboundedError",
     "UndecidedError",
     "Union",
+    "box_directions",
     "convex_hull",
+    "eigenvector_directions",
+    "octagon_directions",
+    "sphere_directions",
     "union_bounds",
     "warm_up",
 ]

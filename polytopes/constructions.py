@@ -12,8 +12,11 @@ from polytopes import motion, projection, reduction, slicing
 from polytopes import support as support_functions
 from polytopes.affine_hull import hull_of, made_explicit
 from polytopes.affine_image import affine_image
+from polytopes.approximation import Bracketed, Copy
 from polytopes.checks import different_coordinates, real_array, real_number, whole_number
+from polytopes.generators import rows_of_generators
 from polytopes.intersection import rows_of_both
+from polytopes.largest_copy import largest_copy
 from polytopes.minkowski_sum import minkowski_sum
 from polytopes.normalisation import normalised
 from polytopes.outer_template import outer_template
@@ -23,6 +26,7 @@ from polytopes.preimage import preimage
 from polytopes.product import product
 from polytopes.redundancy import kept_rows, minimal_rows
 from polytopes.rows import Rows, a_set, dense, nothing, same_space
+from polytopes.shadow_within import bracket
 from polytopes.shape import Shape
 from polytopes.signatures import options_by_name
 
@@ -218,6 +222,51 @@ class Constructions(Shape):
             raise ValueError(f"method is {method!r}; expected one of {', '.join(projection.METHODS)}.")
         limit = whole_number("max_rows", max_rows, least=1)
         return type(self)(*projection.project(self, kept, method, limit, outer))
+
+    def project_within(self, keep: Sequence[int], eps: float) -> Bracketed[Self]:
+        """The projection on some coordinates between two sets: no facet of the inner one is off by more than `eps`.
+
+        By supports, for bounded sets of many rows whose exact projection would have too many facets.  Flat sets, and
+        shadows of one dimension, are projected exactly.
+
+        Parameters
+        ----------
+        keep : sequence of int
+            Different coordinates, at least one.
+        eps : float
+            A distance, in the units of x.
+
+        Raises
+        ------
+        UnboundedError
+            If the projection is unbounded.
+        UndecidedError
+            If the inner set is too thin for a hull in floats.
+        """
+        kept = different_coordinates("keep", keep, self.dim)
+        found = bracket(self, kept, real_number("eps", eps, least=0.0))
+        if found is None:
+            exact = self.project(kept)
+            return Bracketed(exact, exact, 0.0)
+        nothing = np.empty((0, len(kept)))
+        inner = type(self)(*rows_of_generators(found.points, nothing))
+        return Bracketed(inner, type(self)(found.normals, found.offsets), found.gap)
+
+    def largest_copy(self, Q: Rows) -> Copy[Self]:
+        """The largest copy ``centre + scale Q`` in this set, to rounding; of a box, a template, any bounded set Q.
+
+        One linear program; where several centres are as good, one of them.
+
+        Raises
+        ------
+        EmptySetError
+            If a set is empty.
+        UnboundedError
+            If Q is unbounded along a row of this set, or copies of any size fit in.
+        """
+        centre, scale = largest_copy(self, same_space(self, Q))
+        copy = type(self)(*motion.scaled(Q, scale)).translate(centre)
+        return Copy(copy, centre, scale)
 
     def outer_reduce(self, max_facets: int) -> Self:
         """A superset with at most `max_facets` inequalities, bounded if this set is.

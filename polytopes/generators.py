@@ -1,11 +1,12 @@
 """Vertices, rays and lines of any set, and the set of given ones."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
 from polytopes.checks import Floats
-from polytopes.errors import EmptySetError, UndecidedError
+from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.exact_generators import integer_form
 from polytopes.hull import Spread, outer_rows, point_offsets
 from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, short
@@ -61,6 +62,24 @@ def in_integers(P: Rows) -> ExactGenerators:
         At the limit of rays.
     """
     return generators_of(integer_form(P.A, P.b, P.C, P.d)) if P.exact is None else P.exact
+
+
+def exact_vertices(P: Rows) -> list[tuple[Fraction, ...]]:
+    """The vertices of a bounded set in rationals, in lexicographic order; none if it is empty.
+
+    Raises
+    ------
+    UnboundedError
+        If P is unbounded.
+    UndecidedError
+        At the limit of rays.
+    """
+    if not known_nonempty(P):
+        return []
+    found = in_integers(P)
+    if len(found.rays) or len(found.lines):
+        raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
+    return sorted(tuple(Fraction(int(v), int(row[-1])) for v in row[:-1]) for row in found.vertices.tolist())
 
 
 def rows_of_generators(V: Floats, rays: Floats) -> Table:

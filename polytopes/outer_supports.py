@@ -5,6 +5,7 @@ For x in ``{A x <= b, C x = d}`` and multipliers y >= 0 and z, weak duality says
 bound of ``c'x``; along the axes it bounds |x| itself.
 """
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -12,11 +13,12 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.duality import equality_multipliers
 from polytopes.errors import UndecidedError
+from polytopes.generators import in_integers
 from polytopes.integers import up
 from polytopes.linear_program import Maxima
 from polytopes.outward_normals import support_of
 from polytopes.rows import Rows
-from polytopes.support import maxima
+from polytopes.support import known_nonempty, maxima
 
 _EPS = float(np.finfo(np.float64).eps)
 _TINY = float(np.finfo(np.float64).tiny)
@@ -125,3 +127,22 @@ def exact_maximum_of(P: Rows, direction: Floats) -> Fraction | None:
         return None
     outcome = P.program.exact.maximum(direction, start)
     return Fraction(int(outcome.value.p), int(outcome.value.q)) if outcome.status == "optimal" else None
+
+
+def exact_support(P: Rows, direction: Floats) -> Fraction | float:
+    """The exact support of any set along a direction: inf where it is unbounded, -inf if it is empty.
+
+    Raises
+    ------
+    UndecidedError
+        If P is too large for rational arithmetic.
+    """
+    if not known_nonempty(P):
+        return -math.inf
+    if P.exact is None and P.program.exact_point is not None:
+        outcome = P.program.exact.maximum(direction, P.program.exact_point)
+        if outcome.status == "optimal":
+            return Fraction(int(outcome.value.p), int(outcome.value.q))
+        if outcome.status == "unbounded":
+            return math.inf
+    return support_of(in_integers(P), direction)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from typing import Literal, overload
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,8 +16,9 @@ from polytopes.checks import Floats, real_array, real_number, whole_number
 from polytopes.containment import Containment
 from polytopes.distance import Distance
 from polytopes.emptiness import Emptiness
-from polytopes.generators import Generators, generators
+from polytopes.generators import Generators, exact_vertices, generators
 from polytopes.inner_box import inner_box
+from polytopes.outer_supports import exact_support
 from polytopes.redundancy import KeptRows, kept_rows
 from polytopes.rows import Rows, same_space
 from polytopes.separation import Intersects
@@ -45,7 +49,16 @@ class Questions(Rows):
         """
         return not support_functions.known_nonempty(self)
 
-    def support(self, directions: ArrayLike) -> float | Floats:
+    @overload
+    def support(self, directions: ArrayLike, *, exact: Literal[False] = False) -> float | Floats: ...
+
+    @overload
+    def support(self, directions: ArrayLike, *, exact: Literal[True]) -> Fraction | float | list[Fraction | float]: ...
+
+    @options_by_name
+    def support(
+        self, directions: ArrayLike, *, exact: bool = False
+    ) -> float | Floats | Fraction | list[Fraction | float]:
         """Support function ``h(c) = max {c'x : x in P}``; some microseconds a direction in a batch, 30 for a call.
 
         Of a box a sum, without a program.
@@ -53,6 +66,8 @@ class Questions(Rows):
         Parameters
         ----------
         directions : array_like (n,) or (k, n)
+        exact : bool
+            Return `fractions.Fraction`, or a list of k; milliseconds each.
 
         Returns
         -------
@@ -65,7 +80,11 @@ class Questions(Rows):
         UndecidedError
             If a program could not be settled.
         """
-        return support_functions.support(self, directions)
+        if not exact:
+            return support_functions.support(self, directions)
+        rows = real_array("directions", directions, (self.dim,), ("k", self.dim))
+        values = [exact_support(self, row) for row in np.atleast_2d(rows)]
+        return values[0] if rows.ndim == 1 else values
 
     def support_points(self, directions: ArrayLike) -> SupportResult:
         """Values, maximisers and multipliers in k directions; see `SupportResult` and `support`."""
@@ -216,7 +235,14 @@ class Questions(Rows):
         """
         return kept_rows(self)
 
-    def vertices(self) -> Floats:
+    @overload
+    def vertices(self, *, exact: Literal[False] = False) -> Floats: ...
+
+    @overload
+    def vertices(self, *, exact: Literal[True]) -> list[tuple[Fraction, ...]]: ...
+
+    @options_by_name
+    def vertices(self, *, exact: bool = False) -> Floats | list[tuple[Fraction, ...]]:
         """Vertices of a bounded set, array (k, n); (0, n) if it is empty.
 
         In integers where the rows are short, or the set is flat or thin (and its vertices not too many), each rounded
@@ -225,6 +251,12 @@ class Questions(Rows):
         then each vertex from its rows again; corners closer than 1e-9 of the size are one.  The number of vertices, and
         the cost, grow as m^(n/2).
 
+        Parameters
+        ----------
+        exact : bool
+            Return k tuples of n `fractions.Fraction`, by the double description in integers, in the order of their
+            numbers.
+
         Raises
         ------
         UnboundedError
@@ -232,7 +264,7 @@ class Questions(Rows):
         UndecidedError
             If the set is too thin for vertices in floats (below 1e-14 of its size).
         """
-        return vertices(self)
+        return exact_vertices(self) if exact else vertices(self)
 
     def generators(self) -> Generators:
         """Vertices, rays and lines of a nonempty set, bounded or not; see `Generators`.
