@@ -18,12 +18,14 @@ from polytopes.redundancy import KeptRows
 from polytopes.separation import Intersects, SeparatingPlane
 from polytopes.support import Ball, SupportResult
 from polytopes.unions import convex_hull, union_bounds
+from polytopes.zonotopes import ConstrainedZonotope
 
 __all__ = [
     "Ball",
     "Bracketed",
     "Certificate",
     "Chord",
+    "ConstrainedZonotope",
     "Containment",
     "Copy",
     "Distance",

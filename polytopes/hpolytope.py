@@ -18,6 +18,7 @@ from polytopes.piecewise import Union
 from polytopes.shown import Picture, Shown
 from polytopes.signatures import options_by_name
 from polytopes.support import known_nonempty
+from polytopes.zonotopes import ConstrainedZonotope, rows_of_zonotope
 
 
 class HPolytope(Shown, Operators):
@@ -90,6 +91,13 @@ class HPolytope(Shown, Operators):
         n = points.shape[1]
         cone = np.empty((0, n)) if rays is None else real_array("rays", rays, ("r", n), meaning="as many columns as V")
         return cls(*rows_of_generators(points, cone))
+
+    @classmethod
+    def from_zonotope(cls, Z: ConstrainedZonotope) -> Self:
+        """The set of a zonotope or a constrained zonotope Z: an image of a cut cube, exact or outward as images are."""
+        if not isinstance(Z, ConstrainedZonotope):
+            raise TypeError(f"Z is a {type(Z).__name__}; expected a ConstrainedZonotope.")
+        return cls(*rows_of_zonotope(Z))
 
     @classmethod
     def empty(cls, n: int) -> Self:
