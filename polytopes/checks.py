@@ -109,14 +109,17 @@ def different_coordinates(name: str, value: Any, dim: int) -> list[int]:
     return found
 
 
-def listed(name: str, value: Any, kind: type[Item]) -> list[Item]:
-    """What a sequence holds, each item of one kind; TypeError otherwise. A mapping is none: its keys are not meant."""
-    expected = f"expected a sequence of {kind.__name__}"
+def listed(name: str, value: Any, kind: type[Item], *others: type[Item]) -> list[Item]:
+    """What a sequence holds, each item of one of some kinds; TypeError otherwise.
+
+    A mapping is none: its keys are not meant.
+    """
+    expected = f"expected a sequence of {' or '.join(k.__name__ for k in (kind, *others))}"
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         raise TypeError(f"{name} is {_kind_of(value)}; {expected}.")
     items = list(value)
     for i, item in enumerate(items):
-        if not isinstance(item, kind):
+        if not isinstance(item, (kind, *others)):
             raise TypeError(f"{name}[{i}] is {_kind_of(item)}; {expected}.")
     return items
 

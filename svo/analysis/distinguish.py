@@ -7,15 +7,20 @@ samples, the observer is falsified within these N samples, whatever happens.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
 from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
-from svo.analysis.model_pair import ModelPair, PairSolution, Witness
-from svo.models import UncertainModel
+from svo.analysis.model_pair import ModelPair, PairSolution, Witness, check_comparable
+from svo.analysis.tube import Tube
+from svo.checks import Array, expect, finite_array, is_count
+from svo.models import UncertainModel, expect_model
+from svo.models.nonlinear import NonlinearModel
 
 
 @dataclass(frozen=True)
@@ -49,8 +54,8 @@ class Distinguishability(Shown):
 
 @options_by_name
 def distinguishability(
-    plant_model: UncertainModel,
-    observer_model: UncertainModel,
+    plant_model: UncertainModel | NonlinearModel,
+    observer_model: UncertainModel | NonlinearModel,
     horizon: int,
     *,
     initial: HPolytope,
@@ -69,9 +74,9 @@ def distinguishability(
 
     Parameters
     ----------
-    plant_model : UncertainModel
+    plant_model : UncertainModel or NonlinearModel
         The plant, with its fault at a stated size; it should not contain the fault-free plant.
-    observer_model : UncertainModel
+    observer_model : UncertainModel or NonlinearModel
         What the observer assumes; as many inputs and outputs as the plant.
     horizon : int
         Largest number of samples N >= 1 to search.
@@ -91,7 +96,15 @@ def distinguishability(
         For models that do not belong together, and for a wrong or missing argument.
     RuntimeError
         If the solver leaves a program undecided.
+
+    Notes
+    -----
+    A nonlinear model is linearised at each sample over the tube of all its states from the first set on under ``u``,
+    remainders included, so that a number is proven of its own equations: no output is one of both models. The tube
+    knows no measurement, and grows; None says that nothing was shown, and ``searched`` how far the tube was enclosed.
     """
+    if isinstance(plant_model, NonlinearModel) or isinstance(observer_model, NonlinearModel):
+        return _in_tubes(plant_model, observer_model, horizon, initial, observer_initial or initial, u, schedule)
     pair = ModelPair(plant_model, observer_model, horizon, initial, observer_initial or initial, u, schedule)
     below, above = 0, 1
     answers: dict[int, PairSolution] = {}
@@ -110,3 +123,41 @@ def distinguishability(
     exact = answers[above].exact and (below == 0 or answers[below].exact)
     witness = answers[below].witness() if below else None
     return Distinguishability(above, horizon, answers[above].separation, exact, witness)
+
+
+def _in_tubes(
+    plant: Any, observer: Any, horizon: int, initial: HPolytope, observer_initial: HPolytope, u: Any, schedule: Any
+) -> Distinguishability:
+    """Of the linear models that hold in the tubes of nonlinear ones."""
+    expect(is_count(horizon, 1), "horizon", horizon, "a number of samples >= 1")
+    for name, model in (("plant_model", plant), ("observer_model", observer)):
+        if not isinstance(model, NonlinearModel):
+            expect_model(name, model)
+    check_comparable(plant, observer)
+    inputs = inputs_along(plant, u, horizon)
+    linear, most = list[UncertainModel](), horizon
+    for name, model, start in (("initial", plant, initial), ("observer_initial", observer, observer_initial)):
+        if isinstance(model, NonlinearModel):
+            tube = Tube.of(name, model, start, inputs)
+            linear.append(tube.model)
+            most = min(most, tube.samples)
+        else:
+            linear.append(model if schedule is None else model.along(np.asarray(schedule)[:horizon]))
+    own, other = linear
+    numbers = np.arange(float(horizon))
+    found = distinguishability(
+        own, other, most, initial=initial, observer_initial=observer_initial, u=inputs, schedule=numbers
+    )
+    return replace(found, exact=False, witness=None)
+
+
+def inputs_along(model: UncertainModel | NonlinearModel, u: Any, horizon: int) -> Array:
+    """The inputs (horizon, nu) of a tube."""
+    if isinstance(u, HPolytope):
+        raise TypeError("u is a set; expected inputs (K, nu), along which nonlinear models are enclosed")
+    if u is None and model.n_inputs == 0:
+        return np.zeros((horizon, 0))
+    expect(u is not None, "u", u, f"inputs ({horizon}, {model.n_inputs}) of at least as many samples as horizon")
+    given: Array = finite_array("u", u, ("samples", model.n_inputs))
+    expect(len(given) >= horizon, "u", given.shape, f"at least {horizon} samples, as many as horizon")
+    return given[:horizon]

@@ -25,8 +25,10 @@ from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.analysis.distinguish import Distinguishability, distinguishability
 from svo.analysis.model_pair import LEAST_SEPARATION, ModelPair
-from svo.checks import Array, expect, finite_array, is_count, is_finite_number, listed
-from svo.models import UncertainModel, expect_model
+from svo.analysis.nonlinear_design import Models, candidates, separating
+from svo.checks import Array, expect, expect_kind, finite_array, is_count, is_finite_number, listed
+from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 
 _ROUNDS = 60
 _DECREASE = 1e-4  # of the energy, relative, below which the iteration stops
@@ -72,8 +74,8 @@ class InputDesign(Shown):
 
 @options_by_name
 def design_input(
-    plant_model: UncertainModel,
-    observer_models: UncertainModel | Sequence[UncertainModel],
+    plant_model: UncertainModel | NonlinearModel,
+    observer_models: UncertainModel | NonlinearModel | Sequence[UncertainModel | NonlinearModel],
     horizon: int,
     *,
     initial: HPolytope,
@@ -89,9 +91,9 @@ def design_input(
 
     Parameters
     ----------
-    plant_model : UncertainModel
+    plant_model : UncertainModel or NonlinearModel
         The plant, with its fault at a stated size; it should not contain the fault-free plant.
-    observer_models : UncertainModel or sequence of them
+    observer_models : UncertainModel, NonlinearModel, or sequence of them
         Models that must be falsified: those of one observer, or of all that must fall to isolate the fault.
     horizon : int
         Samples N >= 1 within which each of them is falsified.
@@ -130,15 +132,32 @@ def design_input(
     -----
     The answer holds for exactly these inputs, and for whatever first states, disturbances, noises and Deltas within
     their bounds. Where products with Delta are relaxed it is sufficient, as `distinguishability` tells.
+
+    Of nonlinear models linear ones along the reference, then along the last design, give candidates, and inputs at
+    their limits follow; the first of them that `distinguishability` proves in the tubes is taken. Its energy is not the
+    least, and ``u`` None says that none of these was proven.
     """
-    expect_model("plant_model", plant_model)
-    models = [observer_models] if isinstance(observer_models, UncertainModel) else observer_models
-    observers = listed("observer_models", models, UncertainModel)
+    models = [observer_models] if isinstance(observer_models, UncertainModel | NonlinearModel) else observer_models
+    expect_kind("plant_model", plant_model, (UncertainModel, NonlinearModel), "an UncertainModel or a NonlinearModel")
+    observers: list[Any] = listed("observer_models", models, UncertainModel, NonlinearModel)
     sets = _sets(observer_initial, initial, len(observers))
     _check_numbers(horizon, hold, margin)
     given = _reference(reference, horizon, plant_model.n_inputs)
+    plant: Any = plant_model
+    every = Models(plant, observers, initial, sets, schedule)
+    if not every.are_linear:
+        bounds, weights = _limits(limits, given), _weight(weight, given.shape[1])
+        again: dict[str, Any] = {"limits": limits, "reference": given, "weight": weight, "hold": hold}
+        design = lambda near, asked: design_input(  # noqa: E731
+            near.plant, near.observers, horizon, initial=initial, observer_initial=sets, schedule=near.schedule,
+            margin=asked, **again,
+        ).u  # fmt: skip
+        tried = candidates(every, given, bounds, margin, design, _waves(horizon) if hold == 1 else ())
+        u, separation, checks = separating(every, tried)
+        energy = None if u is None else float(np.sum(weights * np.square(u - given)))
+        return InputDesign(u, given, energy, separation, checks)
     pairs = [
-        ModelPair(plant_model, model, horizon, initial, start, given, schedule)
+        ModelPair(plant, model, horizon, initial, start, given, schedule)
         for model, start in zip(observers, sets, strict=True)
     ]
     search = _Search(pairs, given, _limits(limits, given), _weight(weight, given.shape[1]), hold, margin)

@@ -46,6 +46,17 @@ class Witness:
     observer: Explanation
 
 
+def check_comparable(plant: Any, observer: Any) -> None:
+    """Raise ValueError unless two models have as many inputs and outputs, and one sampling time."""
+    if (plant.n_inputs, plant.n_outputs) != (observer.n_inputs, observer.n_outputs):
+        raise ValueError(
+            f"observer_model has {observer.n_inputs} inputs and {observer.n_outputs} outputs; expected "
+            f"{plant.n_inputs} and {plant.n_outputs}, as plant_model has"
+        )
+    if plant.Ts != observer.Ts:
+        raise ValueError(f"observer_model has Ts = {observer.Ts} s; expected {plant.Ts} s, as plant_model has")
+
+
 class ModelPair:
     """A plant's and an observer's model with all that is known of the samples, and the program of the first N of them.
 
@@ -68,13 +79,7 @@ class ModelPair:
         expect_model("plant_model", plant)
         expect_model("observer_model", observer)
         expect(is_count(horizon, 1), "horizon", horizon, "a number of samples >= 1")
-        if (plant.n_inputs, plant.n_outputs) != (observer.n_inputs, observer.n_outputs):
-            raise ValueError(
-                f"observer_model has {observer.n_inputs} inputs and {observer.n_outputs} outputs; expected "
-                f"{plant.n_inputs} and {plant.n_outputs}, as plant_model has"
-            )
-        if plant.Ts != observer.Ts:
-            raise ValueError(f"observer_model has Ts = {observer.Ts} s; expected {plant.Ts} s, as plant_model has")
+        check_comparable(plant, observer)
         boxes = [
             bounded_box(name, P, m.n_states)
             for name, P, m in (("initial", initial, plant), ("observer_initial", observer_initial, observer))

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from polytopes import HPolytope
+from svo.analysis.tube import along_samples
 from svo.logs.drive import drive
 from svo.logs.log import Log
-from svo.models import ScheduleTable, UncertainModel
+from svo.models import UncertainModel
 from svo.models.nonlinear import Linearisation, NonlinearModel
 from svo.observers.window.observer import WindowObserver
 
@@ -118,25 +118,8 @@ def _falsified_part(model: NonlinearModel, log: Log, initial: HPolytope) -> tupl
         samples = [*samples[:-1], *([] if before is None else [before]), now]
         if step.verdict == "falsified":
             part = Log(log.time[: k + 1], log.u[: k + 1], log.y[: k + 1], schedule=np.arange(k + 1.0))
-            return _along(model, samples), part
+            return along_samples(model, samples), part
     return None
-
-
-def _along(model: NonlinearModel, samples: Sequence[Linearisation]) -> UncertainModel:
-    """The linear models of samples as one, whose schedule is the number of the sample."""
-    points = np.arange(max(2.0, len(samples)))
-
-    def table(name: str) -> Any:
-        values = [getattr(sample, name) for sample in samples]
-        return ScheduleTable(points, np.array(values * 2 if len(values) == 1 else values))
-
-    unknown = [*model.disturbances, *model.parameters, *(f"remainder of {name}" for name in model.names["states"])]
-    found: UncertainModel = model.carrier.replace(
-        A=table("A"), C=table("C"), a=table("a"), E=table("E"), c=table("c"), n=table("n"),
-        F=None if model.carrier.F is None else table("F"), schedule=0.0,
-        names={**model.names, "disturbances": unknown},
-    )  # fmt: skip
-    return found
 
 
 def half_widths(model: NonlinearModel) -> dict[str, float]:
