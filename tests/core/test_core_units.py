@@ -29,6 +29,7 @@ PIECES = {
     "boxes": ("polytopes/box.c",),
     "filters": ("filters/*.c",),
     "intervals": ("interval/*.c",),
+    "elementary": tuple(f"tape/{name}.c" for name in ("exponential", "logarithm", "waves", "quarter_turns", "angle")),
 }
 """What of the core each program is linked with."""
 
