@@ -1,7 +1,7 @@
 /* Elementary functions of doubles and of intervals, rounded outward, from + - * / alone: no libm, no rounding mode.
  *
  * `_at`: an interval that contains the exact value at that very double, of neighbouring doubles or with one between them
- * (a subnormal result, or a quotient below 2^-27 of atan2: up to three apart). `_over`: one that contains all values at
+ * (a quotient below 2^-27 of atan2: three apart; a subnormal result: up to four). `_over`: one that contains all values at
  * the points of a bounded interval, the ends being `_at` the ends or the function's own extremes; NaN is no end.
  * README.md derives the error bounds. All finite doubles are arguments, also of sin and cos.
  */
