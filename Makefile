@@ -72,7 +72,7 @@ $(VENV)/.study: pyproject.toml | $(BIN)/python
 
 $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing what the tests need into $(VENV) (about a minute)"
-	$(PIP) --editable '.[study,cluster,compare,logs,dev]'
+	$(PIP) --editable '.[study,cluster,compare,logs,ulog,dev]'
 	@$(if $(ZIG),$(PIP) ziglang)
 	@$(if $(ZIG),CC="$(ZIG)") $(PIP) --editable '.[cdd]' || \
 	  echo "No pycddlib for this machine: its tests will be skipped"

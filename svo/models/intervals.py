@@ -15,6 +15,7 @@ from svo.models.origin import Origin
 from svo.models.stack import OUTPUT_BLOCKS, STATE_BLOCKS, may_be_nonzero
 
 _KEPT = 4096  # intervals of which the matrices are remembered
+_MODELS = 64  # the same of models at their sampling time
 _ROUNDING = 64.0 * float(np.finfo(float).eps)
 
 
@@ -86,9 +87,15 @@ def transition_rows(model: UncertainModel, dt: float | None) -> Array:
     return _rows(model.origin, dt)
 
 
+@lru_cache(maxsize=_MODELS)
+def _own(origin: Origin) -> UncertainModel:
+    found: UncertainModel = origin.model()
+    return found
+
+
 @lru_cache(maxsize=_KEPT)
 def _rows(origin: Origin, dt: float) -> Array:
-    own, other = origin.model(), origin.over(dt)
+    own, other = _own(origin), origin.over(dt)
     rows = other.stack(other.schedule)[:, : own.n_states].copy()
     reach, wanted = (np.maximum(-lower, upper) for lower, upper, _ in (m.bounds(m.schedule) for m in (own, other)))
     E = rows[0, :, rows.shape[2] - reach.size :]

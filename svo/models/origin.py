@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -60,12 +61,14 @@ class Origin(Shown):
     def model(self) -> Plant:
         """The discrete model; raises as `UncertainModel.from_continuous`."""
         check_constant(vars(self.plant))
-        vary = vary_in(self.plant, self.varying)
-        parted = vary.delta | (self.stamps is not None)
-        return replace(_discretised(self.plant, self._width(vary), vary, parted), origin=self)
+        return replace(self._discrete(self.plant), origin=self)
+
+    def _discrete(self, plant: Plant) -> Plant:
+        vary = vary_in(plant, self.varying)
+        return _discretised(plant, self._width(plant, vary), vary, vary.delta | (self.stamps is not None))
 
     def over(self, dt: float) -> Plant:
-        """The discrete model of transitions that take ``dt`` seconds.
+        """The discrete model of transitions that take ``dt`` seconds; it has no origin.
 
         Raises
         ------
@@ -77,7 +80,9 @@ class Origin(Shown):
                 f"dt is {dt:g} s, and remainder is given in numbers, which are of the sampling time "
                 f"{self.plant.Ts:g} s; give remainder = {{'states': ..., 'inputs': ...}}, from which it is computed"
             )
-        return replace(self, plant=replace(self.plant, Ts=dt)).model()
+        plant = copy(self.plant)  # which has been checked
+        object.__setattr__(plant, "Ts", dt)
+        return self._discrete(plant)
 
     def after(self, changes: Mapping[str, Any]) -> Origin:
         """The origin of the discrete model once some of its arguments were replaced."""
@@ -133,23 +138,23 @@ class Origin(Shown):
                 "the faulty plant, from which it is computed for each"
             )
 
-    def _width(self, vary: Varying) -> Array | None:
-        """Bounds (n,) of what is left out for the uncertainties; None where nothing is."""
-        n, given = self.plant.n_states, self.remainder
+    def _width(self, plant: Plant, vary: Varying) -> Array | None:
+        """Bounds (n,) of what is left out for the uncertainties of a plant; None where nothing is."""
+        n, given = plant.n_states, self.remainder
         if isinstance(given, Mapping):
             unknown = given.keys() - {"states", "inputs"}
             if unknown or "states" not in given:
                 raise ValueError(f"remainder has the keys {sorted(given)}; expected 'states' and 'inputs'")
             x = largest("remainder['states']", given["states"], n)
-            u = largest("remainder['inputs']", given.get("inputs"), self.plant.n_inputs)
-            return left_out(self.plant, x, u, vary)
+            u = largest("remainder['inputs']", given.get("inputs"), plant.n_inputs)
+            return left_out(plant, x, u, vary)
         if given is not None:
             width = finite_array("remainder", given)
             if width.shape not in ((), (n,)) or (width < 0).any():
                 raise ValueError(f"remainder is {width} of shape {width.shape}; expected bounds >= 0 of shape ({n},)")
             return np.broadcast_to(width, (n,))
-        items = zip(self.plant.uncertainties, vary.delta, strict=True)
-        if any(_leaves_something_out(*item) for item in items) or _product_varies(self.plant, vary):
+        items = zip(plant.uncertainties, vary.delta, strict=True)
+        if any(_leaves_something_out(*item) for item in items) or _product_varies(plant, vary):
             raise ValueError(
                 f"remainder is missing: give the bound ({n},) of what the first-order discretisation leaves out, or "
                 "remainder = {'states': ..., 'inputs': ...}, the largest absolute values of states and inputs, from "

@@ -101,11 +101,15 @@ class EventPlant:
 
     def state(self, at: Signals, time: float) -> Array:
         """The state at a time until which the signals stay as they are."""
+        moved = expm(self._rates(at) * (time - at.time))
+        return np.asarray(moved[: self.n, : self.n] @ at.x + moved[: self.n, self.n])
+
+    def _rates(self, at: Signals) -> Array:
+        """dx/dt = the first rows times (x, 1)."""
         A, B, a, E = self.total(at.delta, STATE)
         joint = np.zeros((self.n + 1, self.n + 1))
         joint[: self.n, : self.n], joint[: self.n, self.n] = A, B @ at.u + a + E @ at.w
-        moved = expm(joint * (time - at.time))
-        return np.asarray(moved[: self.n, : self.n] @ at.x + moved[: self.n, self.n])
+        return joint
 
     def output(self, way: list[Signals], time: float) -> Array:
         """What the sensors would read without noise."""
@@ -159,9 +163,14 @@ class EventPlant:
         return np.array(values) + self.draw(-self.noise, self.noise)
 
     def _reach(self, way: list[Signals]) -> Array:
-        pairs = [(a, b.time - a.time) for a, b in pairwise(way)]
-        states = [self.state(a, a.time + length * i / INSIDE) for a, length in pairs for i in range(INSIDE)]
-        return np.asarray(1.05 * np.abs(states).max(axis=0))
+        """Bounds of |x| at the ends of all pieces and inside, with some room."""
+        joint, x = np.array([self._rates(at) for at in way[:-1]]), np.array([at.x for at in way])
+        parts = np.array([b.time - a.time for a, b in pairwise(way)])[:, None, None] / INSIDE
+        moved, found = expm(joint * parts), [np.abs(x).max(axis=0)]
+        for _ in range(INSIDE):
+            x[:-1] = np.einsum("kij,kj->ki", moved[:, : self.n, : self.n], x[:-1]) + moved[:, : self.n, self.n]
+            found.append(np.abs(x).max(axis=0))
+        return np.asarray(1.05 * np.max(found, axis=0))
 
     def model(self, Ts: float, reach: Array, inputs: Array, **more: Any) -> UncertainModel:
         nominal, *items = ({k: v for k, v in part.items() if v.any() or k in "AC"} for part in self.parts)
