@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from svo.checks import Array
-from svo.isolation import NOMINAL, NONLINEAR, STAMPED, Alarm, BankRecord, Outcome
+from svo.isolation import NONLINEAR, STAMPED, Alarm, BankRecord, Outcome
 from svo.logs.log import Log
 from svo.models import model_digest
 from svo.models.nonlinear import NonlinearModel
@@ -32,10 +32,15 @@ def alarms_of(
     With the ``observers`` of the bank each alarm carries the digest of its model.
     """
     found = alarms_at(record, log.time, source, observers, record.log.schedule)
-    if not observers or not log.keeps_its_times(observers[NOMINAL].Ts):
-        return found
-    first = [alarm.sample + 1 - len(alarm.certificate.samples) for alarm in found]
-    return tuple(replace(a, dt=np.diff(log.time[k : a.sample + 1])) for a, k in zip(found, first, strict=True))
+    return with_intervals(found, log) if observers else found
+
+
+def with_intervals(alarms: tuple[Alarm, ...], log: Log) -> tuple[Alarm, ...]:
+    """Alarms of a log with the seconds between the samples of their proofs, where it keeps its own times."""
+    if not log.keeps_its_times:
+        return alarms
+    first = [alarm.sample + 1 - len(alarm.certificate.samples) for alarm in alarms]
+    return tuple(replace(a, dt=np.diff(log.time[k : a.sample + 1])) for a, k in zip(alarms, first, strict=True))
 
 
 def alarms_at(

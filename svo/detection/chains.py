@@ -126,7 +126,7 @@ def _widened(its: ModelSample, mine: ModelSample, observer: Observer) -> ModelSa
 
 def _sample(observer: Observer, log: Log, k: int, last: int) -> ModelSample:
     """Matrices and bounds at sample k, with the transition to the next one, where a proof goes on to it."""
-    dt = log.interval_at(k + 1, observer.Ts) if k < last else None
+    dt = log.interval_at(k + 1) if k < last else None
     return ModelSample.of(observer.model, log.schedule_at(k), interval_of(observer.model, dt))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from svo.detection.bank_alarms import KEPT_SCHEDULES, alarms_at, source_of_bank
+from svo.detection.bank_alarms import KEPT_SCHEDULES, alarms_at, source_of_bank, with_intervals
 from svo.detection.findings import ChangeAt, Findings
 from svo.detection.thresholds import DetectsThresholds
 from svo.interval.on_log import ThresholdDetection
@@ -114,6 +114,8 @@ def detect_streamed(
             progress(done, log.samples)
     source = {**source_of_bank(plant), "noise": noise, "log": log.path.name}
     alarms = alarms_at(outcome, times, source, bank.observers, schedules.of_alarms)
+    if log.kept is not None:
+        alarms = with_intervals(alarms, log.kept)
     return StreamedDetection(plant, noise, log, outcome, times, alarms, thresholds)
 
 

@@ -330,7 +330,7 @@ class Bank(Shown, ABC):
             count = max(count, 1)
             k += count
             steps = {front.name: front.take(count) for front in running}
-            before, dt = log.u[k - 2] if k > 1 else None, log.interval_at(k - 1, self.Ts)
+            before, dt = log.u[k - 2] if k > 1 else None, log.interval_at(k - 1)
             now = Sample.given(before, log.y[k - 1], log.u[k - 1], log.schedule_at(k - 1), dt)
             yield self._conclude((-1 if self._sample is None else self._sample) + count, steps, now), count
 

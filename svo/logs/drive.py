@@ -94,9 +94,8 @@ def advance_to(driven: Driven[Answer], log: Log, k: int, schedule: Any, **option
 
 def _interval(driven: Driven[Answer], log: Log, k: int) -> float | None:
     """Seconds from sample k - 1 to k of a log that keeps its own times; None where that is the sampling time."""
-    Ts = getattr(driven, "Ts", None)
-    if isinstance(Ts, float):
-        return log.interval_at(k, Ts)
+    if hasattr(driven, "Ts"):
+        return log.interval_at(k)
     if log.events:
         raise TypeError(f"{type(driven).__name__} takes no log that keeps its own times (Log.events); resample it")
     return None

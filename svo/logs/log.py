@@ -13,7 +13,7 @@ from polytopes.shown import Picture, Shown, counted, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect_kind, expect_shape, readings, real_array, sizes
 from svo.logs import frames
-from svo.logs.columns import checked_parts, is_sampled
+from svo.logs.columns import TIME_TOLERANCE, checked_parts
 from svo.logs.names import Columns
 from svo.pictures.timeline import Panel, Timeline
 
@@ -39,7 +39,7 @@ class Log(Shown):
         Where it comes from, such as the name of its file: stored with the alarms that it raises.
     events : bool, optional
         Whether each transition takes the time between its stamps (True), or the model's sampling time (False). By
-        default the former where one of them is off the latter by more than 1 %.
+        default the former where the steps differ so much that no sampling time is within 1 % of all of them.
     widening : (ny,) array, optional
         By what the bound of each sensor's noise is wider on this log than in the model, half-widths in its unit: the
         price of readings that were moved in time, and of numbers that were rounded. `svo.detect` adds it.
@@ -97,21 +97,18 @@ class Log(Shown):
         value = self.schedule[k]
         return float(value) if value.ndim == 0 else value
 
-    def keeps_its_times(self, Ts: float) -> bool:
-        """Whether a transition takes the time between its stamps, for models with the sampling time ``Ts``."""
+    @cached_property
+    def keeps_its_times(self) -> bool:
+        """Whether a transition takes the time between its stamps instead of the model's sampling time."""
         if self.events is None:
-            least, most = self._steps
-            return not (is_sampled(0.0, least, Ts) and is_sampled(0.0, most, Ts))
+            steps = np.diff(self.time)
+            least, most = steps.min(initial=np.inf), steps.max(initial=0.0)
+            return bool(most * (1 - TIME_TOLERANCE) > least * (1 + TIME_TOLERANCE))
         return self.events
 
-    def interval_at(self, k: int, Ts: float) -> float | None:
-        """Seconds from sample k - 1 to k; None where that is the sampling time ``Ts``, or k the first sample."""
-        return float(self.time[k] - self.time[k - 1]) if k > 0 and self.keeps_its_times(Ts) else None
-
-    @cached_property
-    def _steps(self) -> tuple[float, float]:
-        steps = np.diff(self.time)
-        return float(steps.min(initial=np.inf)), float(steps.max(initial=-np.inf))
+    def interval_at(self, k: int) -> float | None:
+        """Seconds from sample k - 1 to k; None where that is the sampling time, or k the first sample."""
+        return float(self.time[k] - self.time[k - 1]) if k > 0 and self.keeps_its_times else None
 
     # -- other forms -----------------------------------------------------------------------------
 

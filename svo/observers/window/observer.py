@@ -390,7 +390,7 @@ class WindowObserver(Observer):
     def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | None:
         """Samples of a log for one call of the kernel; None where the next one needs more than that."""
         gone = self._lost or self._alarm is not None or self._readings is not None or self._missing.any()
-        if gone or self._plant is not None or self._stamped is not None or log.keeps_its_times(self.Ts):
+        if gone or self._plant is not None or self._stamped is not None or log.keeps_its_times:
             return None
         last = min(first + min(count, self._window.takes_at_once), len(log))
         return log_samples(self._form, log, first, last, self._wants_next_input)

@@ -197,6 +197,16 @@ def test_a_chain_of_bounds_is_proven_at_times_of_its_own() -> None:
     assert chain.falsified_at == bank(model).observers["nominal"].run(log).falsified_at
 
 
+def test_a_log_keeps_its_own_times_where_no_sampling_time_fits() -> None:
+    def keeps(*steps: float, events: bool | None = None) -> bool:
+        time = np.cumsum([0.0, *steps])
+        return Log(time, np.zeros((time.size, 0)), np.zeros((time.size, 1)), events=events).keeps_its_times
+
+    assert [keeps(), keeps(0.7), keeps(0.7, 0.7), keeps(0.1, 0.1019)] == [False] * 4
+    assert [keeps(0.1, 0.1025), keeps(0.1, 0.2), keeps(0.7, events=True)] == [True] * 3
+    assert not keeps(0.1, 0.2, events=False)
+
+
 # -- what is refused -----------------------------------------------------------------------------------------------
 
 
@@ -207,7 +217,9 @@ def test_a_discrete_model_takes_its_sampling_time_within_a_hundredth() -> None:
     with pytest.raises(ValueError, match=r"dt is 0\.51 s; expected the model's sampling time 0\.5 s, within 1 %"):
         observer.step(None, [0.0], dt=0.51)
     with pytest.raises(ValueError, match="sampling time"):
-        WindowObserver(observer.model, HPolytope.box([-1], [1])).run(Log([0.0, 0.7], np.zeros((2, 0)), [[0.0], [0.0]]))
+        WindowObserver(observer.model, HPolytope.box([-1], [1])).run(
+            Log([0.0, 0.5, 1.2], np.zeros((3, 0)), np.zeros((3, 1)))
+        )
 
 
 @pytest.mark.parametrize(
