@@ -40,7 +40,7 @@ COMMANDS = {
     "nonlinear": (
         ("benchmarks.nonlinear", "--samples", "48000"),
         ("benchmarks.enclosed_points", "--count", "80"),
-        ("benchmarks.tape_operations", "--points", "50000"),
+        ("benchmarks.tape_operations", "--points", "10000"),
         ("benchmarks.eclipse_banks", "--runs", "3", "--manoeuvres", "2"),
     ),
     "mutation": (("tests.mutation",),),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 
@@ -15,6 +16,8 @@ from svo.functions.tape import Tape, Unenclosed
 
 BITS = 300
 POINTS = 6  # of each box
+ALIKE = 3  # boxes of the same tape
+KINDS = ("plain", "plain", "plain", "extreme", "extreme", "turn", "unit")
 EXTREMES = (0.0, 5e-324, 2.3e-308, 1e-160, 1e-30, 1e17, 1e160, 1e300, 1.7e308)
 OPERATIONS = [op for op in Op if op.operands and op is not Op.CONSTANT and op is not Op.VARIABLE]
 
@@ -32,29 +35,35 @@ IN_BALLS: dict[Op, Callable[..., arb]] = {
 }  # fmt: skip
 
 
-def draw_box(rng: np.random.Generator, extreme: bool) -> tuple[float, float]:
-    """Ends of an interval: a point, narrow, wide, through zero or with an end there; of any size if ``extreme``."""
-    if extreme:
-        ends = rng.choice(EXTREMES, 2) * rng.choice([-1.0, 1.0], 2)
+def draw_box(rng: np.random.Generator, kind: str) -> tuple[float, float]:
+    """Ends of an interval: a point, narrow, wide, through zero or with an end there."""
+    if kind == "extreme":
+        low, high = sorted(float(v) for v in rng.choice(EXTREMES, 2) * rng.choice([-1.0, 1.0], 2))
+    elif kind == "turn":  # a few doubles about a multiple of a quarter turn, or zero
+        middle = (
+            float(rng.integers(-(2 ** int(rng.integers(1, 53))), 2**52 // 2 ** int(rng.integers(0, 52)))) * math.pi / 2
+        )
+        step = math.ulp(middle) * 2.0 ** rng.integers(0, 30)
+        low, high = middle - step * float(rng.integers(0, 3)), middle + step * float(rng.integers(0, 3))
     else:
-        size = 10.0 ** rng.uniform(-6, 6)
+        size = 2.0 ** float(rng.integers(-300, 301)) if kind == "unit" else 10.0 ** rng.uniform(-6, 6)
         middle = size * rng.choice([-1.0, 1.0])
         width = size * rng.choice([0.0, 1e-14, 1e-6, 0.03, 0.5, 1.0, 3.0])
-        ends = np.array([middle - width, middle + width])
-    low, high = sorted(float(v) for v in ends)
+        low, high = middle - width, middle + width
     if rng.uniform() < 0.3:
         low, high = (high, high) if rng.uniform() < 0.2 else (max(low, 0.0), max(high, 0.0))
     return low, high
 
 
-def examine(op: Op, rng: np.random.Generator, boxes: int) -> Counter[str]:
+def examine(op: Op, rng: np.random.Generator, boxes: int, points: int = POINTS) -> Counter[str]:
     """An operation of single variables, or of sums of two, over random boxes, at random points and corners of each."""
     count: Counter[str] = Counter()
     with ctx.workprec(BITS):
-        for _ in range(boxes):
-            extreme, summed = rng.uniform() < 0.3, rng.uniform() < 0.5
-            tape, arguments = _one(op, rng, summed)
-            ends = np.array([draw_box(rng, extreme) for _ in range(tape.variables)])
+        for box in range(boxes):
+            if box % ALIKE == 0:
+                tape, arguments = _one(op, rng, summed=rng.uniform() < 0.5)
+            kind = str(rng.choice(KINDS))
+            ends = np.array([draw_box(rng, kind) for _ in range(tape.variables)])
             lower, upper = ends[:, 0].copy(), ends[:, 1].copy()
             try:
                 tape.ranges(lower, upper)
@@ -62,7 +71,7 @@ def examine(op: Op, rng: np.random.Generator, boxes: int) -> Counter[str]:
             except Unenclosed:
                 count["refused"] += 1
                 continue
-            count += _compare(op, tape, arguments, lower, upper, rng)
+            count += _compare(op, tape, arguments, lower, upper, rng, points)
     return count
 
 
@@ -81,12 +90,12 @@ def _one(op: Op, rng: np.random.Generator, summed: bool) -> tuple[Tape, Array]:
 
 
 def _compare(
-    op: Op, tape: Tape, arguments: Array, lower: Array, upper: Array, rng: np.random.Generator
+    op: Op, tape: Tape, arguments: Array, lower: Array, upper: Array, rng: np.random.Generator, points: int
 ) -> Counter[str]:
     count: Counter[str] = Counter()
     (low,), (high,) = tape.ranges(lower, upper)
     forms = tape.forms(lower, upper, tape.variables)
-    for point in range(POINTS):
+    for point in range(points):
         share = rng.integers(0, 2, len(lower)) if point < 3 else rng.uniform(size=len(lower))
         z = np.clip((1.0 - share) * lower + share * upper, lower, upper)
         exact = [arb(v) for v in z.tolist()]

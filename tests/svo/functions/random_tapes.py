@@ -55,7 +55,7 @@ def _are_ordered(a: arb, b: arb) -> bool:
     return bool(a >= b) or bool(a < b)
 
 
-def examine(rng: np.random.Generator, boxes: int) -> Counter[str]:
+def examine(rng: np.random.Generator, boxes: int, points: int = POINTS) -> Counter[str]:
     """Random tapes, each over a box."""
     count: Counter[str] = Counter()
     with ctx.workprec(BITS):
@@ -72,7 +72,7 @@ def examine(rng: np.random.Generator, boxes: int) -> Counter[str]:
             except Unenclosed:
                 count["refused"] += 1
                 continue
-            for point in range(POINTS):
+            for point in range(points):
                 share = rng.integers(0, 2, len(lower)) if point < 3 else rng.uniform(size=len(lower))
                 _compare(tape, forms, ranges, np.clip((1.0 - share) * lower + share * upper, lower, upper), count)
     return count
