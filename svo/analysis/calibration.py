@@ -167,6 +167,7 @@ def _until_consistent(
     model: NonlinearModel, log: Log, initial: HPolytope, bounds: Sequence[str], window: int
 ) -> Calibration:
     """The linear models of each run give the bounds of the next one, until nothing is falsified."""
+    initial = model.whole(initial)
     plant, first, half = WidenedPlant.of(model, bounds), dict[str, int](), half_widths(model)
     for _ in range(_MOST_RUNS):
         part = plant.falsified_part(log, initial)

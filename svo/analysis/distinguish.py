@@ -135,6 +135,10 @@ def _in_tubes(
             expect_model(name, model)
     check_comparable(plant, observer)
     inputs = inputs_along(plant, u, horizon)
+    initial, observer_initial = (
+        model.whole(start) if isinstance(model, NonlinearModel) else start
+        for model, start in ((plant, initial), (observer, observer_initial))
+    )
     linear, most = list[UncertainModel](), horizon
     for name, model, start in (("initial", plant, initial), ("observer_initial", observer, observer_initial)):
         if isinstance(model, NonlinearModel):

@@ -128,5 +128,5 @@ def half_widths(model: NonlinearModel) -> dict[str, float]:
     half = 0.5 * (model.flow.w.upper - model.flow.w.lower)
     found = {f"noise {name}": float(n) for name, n in zip(model.names["outputs"], model.noise, strict=True)}
     found |= {f"disturbance {name}": float(h) for name, h in zip(model.disturbances, half[:nw], strict=True)}
-    free = zip(model.parameters, half[nw:], strict=True)
+    free = zip(model.free, half[nw:], strict=True)
     return found | {f"parameter {name}": float(h) for name, h in free if h > 0.0}

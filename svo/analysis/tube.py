@@ -24,7 +24,7 @@ def along_samples(model: NonlinearModel, samples: Sequence[Linearisation]) -> Un
         values = [getattr(sample, name) for sample in samples]
         return ScheduleTable(points, np.array(values * 2 if len(values) == 1 else values))
 
-    unknown = [*model.disturbances, *model.parameters, *(f"remainder of {name}" for name in model.names["states"])]
+    unknown = [*model.disturbances, *model.free, *(f"remainder of {name}" for name in model.names["states"])]
     found: UncertainModel = model.carrier.replace(
         A=table("A"), C=table("C"), a=table("a"), E=table("E"), c=table("c"), n=table("n"),
         F=None if model.carrier.F is None else table("F"), schedule=0.0,
@@ -60,6 +60,7 @@ class Tube:
         ValueError
             Naming the set, if the equations do not hold or have no value over it.
         """
+        initial = model.whole(initial)
         bounded_box(name, initial, model.n_states)
         lower, upper = first_box(initial, model)
         model.check_first(lower, upper)

@@ -64,7 +64,8 @@ def rewritten(
     return nominal.replace(
         f=of(f, dynamics) if dynamics is not unchanged else nominal.f,
         h=of(h, outputs) if outputs is not unchanged else nominal.h,
-        disturbances=every, w=(low, high), parameters=sizes, n=nominal.noise if noise is None else noise,
+        disturbances=every, w=(low, high), parameters=sizes, constant=nominal.kept,
+        n=nominal.noise if noise is None else noise,
     )  # fmt: skip
 
 

@@ -76,7 +76,8 @@ class ParameterFault(Shown):
         low, high = self.healthy(nominal)
         bounds = (low + min(0.0, self.magnitude), high + max(0.0, self.magnitude))
         changes = {name: _merged(getattr(nominal, name), own) for name, own in self.equations.items()}
-        return nominal.replace(parameters={**nominal.parameters, self.parameter: bounds}, **changes)
+        still = tuple(name for name in nominal.kept if name != self.parameter)  # one that moves is not constant
+        return nominal.replace(parameters={**nominal.parameters, self.parameter: bounds}, constant=still, **changes)
 
     @property
     def equations(self) -> dict[str, Any]:

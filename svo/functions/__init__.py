@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from svo.checks import real_number
 from svo.functions.expression import Expression, Recorder
 from svo.functions.operations import Op
 
@@ -31,6 +32,7 @@ __all__ = [
     "sin",
     "sqrt",
     "sroot",
+    "table",
     "tanh",
 ]
 
@@ -123,6 +125,49 @@ def piecewise(v: Value, breaks: Sequence[float], pieces: Sequence[Value]) -> Val
     for end, piece in zip(reversed(ends), reversed(pieces[:-1]), strict=True):
         value = _applied(Op.SELECT, lambda s, a, b: np.where(s < 0.0, a, b), v - end, piece, value)
     return value
+
+
+def table(v: Value, points: Sequence[float], values: Sequence[float]) -> Value:
+    """A table of ``v`` that is linear between its points, and constant before the first and after the last one.
+
+    Its slope over any range is between the least and the largest of the pieces there; over a piece, and at a point, it
+    is exact. Monotone or not.
+
+    Parameters
+    ----------
+    v : number, array or expression
+    points : sequence of float
+        Increasing, at least two.
+    values : sequence of float
+        One a point.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For numbers that are not finite, points that do not increase, or another number of values.
+    """
+    at, of = (_numbers(name, given) for name, given in (("points", points), ("values", values)))
+    if len(at) < 2 or len(of) != len(at) or not all(a < b for a, b in pairwise(at)):
+        raise ValueError(
+            f"table has {len(at)} points and {len(of)} values; expected at least two increasing points, a value each"
+        )
+    if isinstance(v, np.ndarray) and v.dtype == object:
+        return np.array([table(one, at, of) for one in v.ravel()], dtype=object).reshape(v.shape)
+    if not isinstance(v, Expression):
+        return np.interp(v, at, of)
+    exact = v.recorder.constant  # what rounds is then enclosed
+    x, y = [exact(point) for point in at], [exact(value) for value in of]
+    slopes = [(y[i + 1] - y[i]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
+    value, before = y[0], exact(0.0)
+    for point, slope in zip(x, [*slopes, exact(0.0)], strict=True):
+        value, before = value + (slope - before) * max(v - point, 0.0), slope
+    return value
+
+
+def _numbers(name: str, given: Any) -> list[float]:
+    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
+        raise TypeError(f"{name} is {given!r:.60}; expected a list of numbers")
+    return [real_number(f"{name}[{i}]", number) for i, number in enumerate(given)]
 
 
 def _applied(op: Op, of_numbers: Callable[..., Any], *operands: Value) -> Value:

@@ -19,12 +19,13 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Pow: operator.pow,
 }  # fmt: skip
 _UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
-_FUNCTIONS = {name: getattr(functions, name) for name in functions.__all__ if name != "piecewise"}
+_OF_LISTS = {"piecewise": "piecewise(h, [0, 1], [0, h, 1])", "table": "table(h, [0, 1, 2], [0, 5, 6])"}
+_FUNCTIONS = {name: getattr(functions, name) for name in functions.__all__ if name not in _OF_LISTS}
 _OPERANDS = {"atan2": 2, "max": 2, "min": 2}
 
 
 def parsed(where: str, text: str, recorder: Recorder, symbols: Mapping[str, Expression]) -> Expression:
-    """An expression of symbols, numbers, ``+ - * / **``, and the functions of `svo.functions` (but for piecewise).
+    """An expression of symbols, numbers, ``+ - * / **``, and the functions of `svo.functions`.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ class _Reader:
             return self.symbols[node.id]
         if node.id in CONSTANTS:
             return self._of(CONSTANTS[node.id])
-        if node.id in _FUNCTIONS:
+        if node.id in _FUNCTIONS or node.id in _OF_LISTS:
             raise self._error(node, f"unknown symbol {node.id!r}; it is a function: expected {node.id}(...)")
         known = [*self.symbols, *CONSTANTS]
         close = get_close_matches(node.id, known, 1)
@@ -116,14 +117,40 @@ class _Reader:
 
     def _call(self, node: ast.Call) -> Expression:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
+        if name in _OF_LISTS:
+            return self._of_lists(node, name)
         if name not in _FUNCTIONS:
             close = get_close_matches(name, _FUNCTIONS, 1)
             hint = f", such as {close[0]}" if close else ""
-            raise self._error(node, f"unknown function {name!r:.60}; expected one of {', '.join(_FUNCTIONS)}{hint}")
+            every = ", ".join([*_FUNCTIONS, *_OF_LISTS])
+            raise self._error(node, f"unknown function {name!r:.60}; expected one of {every}{hint}")
         count = _OPERANDS.get(name, 1)
         if node.keywords or len(node.args) != count:
             raise self._error(node, f"{name} takes {count} argument{'s' * (count > 1)}, each an expression")
         return self._of(_FUNCTIONS[name](*(self.value(argument) for argument in node.args)))
+
+    def _of_lists(self, node: ast.Call, name: str) -> Expression:
+        """piecewise(e, [breaks], [pieces]) and table(e, [points], [values])."""
+        lists = node.args[1:]
+        if node.keywords or len(node.args) != 3 or not all(isinstance(given, ast.List) for given in lists):
+            raise self._error(node, f"{name} takes an expression and two lists, such as {_OF_LISTS[name]}")
+        first, second = (given.elts for given in lists if isinstance(given, ast.List))
+        numbers = [self._fixed(item) for item in first]
+        try:
+            if name == "table":
+                return self._of(functions.table(self.value(node.args[0]), numbers, [self._fixed(i) for i in second]))
+            pieces = [self.value(item) for item in second]
+            return self._of(functions.piecewise(self.value(node.args[0]), numbers, pieces))
+        except NoValue:
+            raise
+        except ValueError as error:
+            raise error if str(error).startswith(self.where) else self._error(node, str(error)) from None
+
+    def _fixed(self, node: ast.expr) -> float:
+        number = _constant(node)
+        if number is None:
+            raise self._error(node, f"{ast.unparse(node)!r:.60} is no number, which stands in a list of them")
+        return number
 
     def _error(self, node: ast.expr, what: str) -> ValueError:
         return ValueError(f"{self.where}: {what} (column {node.col_offset + 1} of {self.text!r:.200})")

@@ -54,6 +54,15 @@ def within(physical: StateRange | None, lower: Array, upper: Array) -> tuple[Arr
     return (lower, upper) if physical is None else physical.cut(lower, upper)[:2]
 
 
+def beside(of: StateRange | None, more: tuple[Array, Array], n: int) -> StateRange | None:
+    """The range of n states and of further ones between two bounds; None where neither says anything."""
+    if not len(more[0]):
+        return of
+    free = np.full(n, np.inf)
+    lower, upper = (-free, free) if of is None else (of.lower, of.upper)
+    return StateRange(np.append(lower, more[0]), np.append(upper, more[1]))
+
+
 def state_range(name: str, value: Any, n: int, bounded: bool) -> StateRange | None:
     """From an argument (lower, upper) of a model; a number stands for every state.
 

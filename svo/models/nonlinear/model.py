@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polytopes import HPolytope
 from polytopes.shown import Shown, counted
 from polytopes.signatures import options_by_name
 from polytopes.value import Value
@@ -17,16 +18,17 @@ from svo.checks import Array, expect, expect_kind, expect_shape, finite_array, i
 from svo.functions.operations import Op
 from svo.functions.tape import Tape
 from svo.logs.log import Log
+from svo.models.draws import draw
 from svo.models.nonlinear.carrier import carrier_of
 from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput, check_output
 from svo.models.nonlinear.plant_kernel import PlantKernel
 from svo.models.nonlinear.simulation import given_values, simulated
 from svo.models.nonlinear.stamps import stamped
-from svo.models.nonlinear.tracing import Function, OfVectors, Symbols, retraced, traced
+from svo.models.nonlinear.tracing import Function, OfVectors, Symbols, retraced, traced, with_kept
 from svo.models.nonlinear.transition import Transition
 from svo.models.stamps import jitter_of
-from svo.models.state_range import StateRange, start_range, state_range
+from svo.models.state_range import StateRange, beside, start_range, state_range
 
 
 @options_by_name
@@ -61,6 +63,9 @@ class NonlinearModel(Value, Shown):
     varying : str or sequence of str
         Disturbances and parameters that may change inside a sample: their names, "w" (all disturbances), "p" (all
         parameters) or "all". The others are held from sample to sample.
+    constant : bool, str or sequence of str
+        Parameters that never change, by name; True for all. Each is one more state, after the others, with zero
+        derivative, so that data narrow its bounds: ranges and first sets are given for the states of f alone.
     jitter : float or (ny,) array, optional
         Bound of the error of the time stamps [s]: a reading may have been taken so much before or after its stamp. Only
         of equations in continuous time. Inputs change at their stamps.
@@ -77,7 +82,9 @@ class NonlinearModel(Value, Shown):
     Attributes
     ----------
     physical_range, valid_range, start_range : StateRange or None
-        ``physical``, ``valid``, and ``largest`` within ``physical``.
+        ``physical``, ``valid``, and ``largest`` within ``physical``; bounds of ``kept`` parameters included.
+    kept, free : tuple of str
+        Parameters that are states, and the others.
 
     Raises
     ------
@@ -97,11 +104,14 @@ class NonlinearModel(Value, Shown):
     n: Any = 0.0
     w: Any = None
     varying: str | Sequence[str] = ()
+    constant: bool | str | Sequence[str] = False
     jitter: Any = None
     physical: Any = None
     valid: Any = None
     largest: Any = None
     continuous: bool = True
+    kept: tuple[str, ...] = field(init=False, repr=False)
+    free: tuple[str, ...] = field(init=False, repr=False)
     flow: Flow = field(init=False, repr=False)
     reading: Tape = field(init=False, repr=False)
     noise: Array = field(init=False, repr=False)
@@ -127,6 +137,10 @@ class NonlinearModel(Value, Shown):
         symbols, n = self.symbols, len(self.states)
         low, high = (end[len(self.disturbances) :] for end in span)
         fixed = np.where(low == high, low, np.nan)
+        put("kept", _kept(self.constant, list(self.parameters), low < high))
+        put("free", tuple(name for name in self.parameters if name not in self.kept))
+        is_kept = np.isin([*self.disturbances, *self.parameters], self.kept)
+        span, known = Span(*(end[~is_kept] for end in span)), Span(*(end[is_kept] for end in span))
         for name in ("physical", "valid"):
             put(f"{name}_range", state_range(name, getattr(self, name), n, bounded=False))
         largest = start_range(self.physical_range, state_range("largest", self.largest, n, bounded=True))
@@ -135,13 +149,17 @@ class NonlinearModel(Value, Shown):
                 "largest is missing, and physical is not bounded; expected largest=(lower, upper): where the state is "
                 "when a set has to start again, which every later alarm then rests on"
             )
-        put("start_range", largest)
-        tape = traced("f", self.f, symbols, fixed, self.states)
-        varies = _varying(self.varying, self.disturbances, list(self.parameters))
-        put("flow", Flow(tape, span, varies, tuple(self.states), self.physical_range, self.valid_range))
+        put("start_range", beside(largest, known, n))
+        put("physical_range", beside(self.physical_range, known, n))
+        if self.valid_range is not None:
+            put("valid_range", beside(self.valid_range, known, n))
+        own = traced("f", self.f, symbols, fixed, self.states, self.kept)
+        tape = with_kept(own, n, len(self.kept), self.continuous)
+        varies = _varying(self.varying, self.disturbances, self.free)
+        put("flow", Flow(tape, span, varies, (*self.states, *self.kept), self.physical_range, self.valid_range))
         written = tuple(self.h) if isinstance(self.h, Mapping) else None
         outputs = written if self.outputs is None else _names("outputs", self.outputs)
-        put("reading", traced("h", self.h, symbols, fixed, outputs))
+        put("reading", traced("h", self.h, symbols, fixed, outputs, self.kept))
         ny = len(self.reading.outputs)
         if ny == 0:
             raise ValueError("h has no rows; expected at least one sensor")
@@ -170,7 +188,7 @@ class NonlinearModel(Value, Shown):
 
     @property
     def n_states(self) -> int:
-        return len(self.states)
+        return len(self.states) + len(self.kept)
 
     @property
     def n_inputs(self) -> int:
@@ -205,7 +223,7 @@ class NonlinearModel(Value, Shown):
     @property
     def names(self) -> Mapping[str, Sequence[str]]:
         """Of states, inputs, outputs and disturbances."""
-        every = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs or ()}
+        every = {"states": (*self.states, *self.kept), "inputs": self.inputs, "outputs": self.outputs or ()}
         return every | {"disturbances": self.disturbances}
 
     @cached_property
@@ -215,8 +233,9 @@ class NonlinearModel(Value, Shown):
         Its disturbances are w, p, and one a state between -1 and 1, whose column is the remainder.
         """
         n, nw = self.n_states, len(self.flow.varying)
+        ends = _ends(self.physical_range), _ends(self.start_range)
         is_disturbed = bool((self.reading.used[n : n + nw] & ~self.flow.varying).any())
-        return carrier_of(self.flow, self.n_inputs, is_disturbed, self.noise, self.Ts, self.physical, self.largest)
+        return carrier_of(self.flow, self.n_inputs, is_disturbed, self.noise, self.Ts, *ends)
 
     @cached_property
     def kernel(self) -> PlantKernel:
@@ -233,6 +252,13 @@ class NonlinearModel(Value, Shown):
     def replace(self, **changes: Any) -> NonlinearModel:
         """A copy with ``changes`` of arguments by name, checked again."""
         return replace(self, **changes)
+
+    def whole(self, set: HPolytope) -> HPolytope:
+        """A ``set`` of states with the bounds of constant parameters, where it is one of the states of f alone."""
+        if not self.kept or set.dim != len(self.states):
+            return set
+        n = len(self.states)
+        return set.product(HPolytope.box(self.start_range.lower[n:], self.start_range.upper[n:]))
 
     # -- over a set ------------------------------------------------------------------------------
 
@@ -351,6 +377,7 @@ class NonlinearModel(Value, Shown):
         Parameters
         ----------
         x0 : (n,) array
+            Or only the states of f: parameters that are constant are then drawn.
         u : (K, nu) array
             One row a sample; the log has K samples.
         rng : numpy.random.Generator
@@ -369,13 +396,20 @@ class NonlinearModel(Value, Shown):
             For a wrong shape, NaN or Inf, or if the run leaves the range where the equations have values.
         """
         inputs = finite_array("u", u, ("samples", self.n_inputs))
-        x: Array = finite_array("x0", x0, (self.n_states,))
+        x: Array = finite_array("x0", x0, (len(self.states),), (self.n_states,))
         expect_shape(len(inputs), "u", inputs, f"(samples, {self.n_inputs}), at least one sample")
         expect_kind("rng", rng, np.random.Generator, "a numpy Generator, such as np.random.default_rng(0)")
         expect(is_count(substeps, 1), "substeps", substeps, "a number of steps >= 1")
         T = self.Ts if self.continuous else None
-        given = given_values(self.flow, list(self.parameters), parameters or {}, len(inputs))
+        if len(x) < self.n_states:
+            lower, upper = (end[len(x) :] for end in (self.start_range.lower, self.start_range.upper))
+            x = np.append(x, draw(lower, upper, rng, corners))
+        given = given_values(self.flow, self.free, parameters or {}, len(inputs))
         return simulated(self.flow, self.reading, self.noise, self.Ts, x, inputs, rng, corners, T, int(substeps), given)
+
+
+def _ends(of: StateRange | None) -> tuple[Array, Array] | None:
+    return None if of is None else (of.lower, of.upper)
 
 
 def _names(what: str, given: Any) -> tuple[str, ...]:
@@ -407,6 +441,17 @@ def _bounds(w: Any, disturbances: Sequence[str], parameters: Any) -> Span:
         if low > high:
             raise ValueError(f"{name} is between {low} and {high}; expected lower <= upper")
     return span
+
+
+def _kept(constant: Any, parameters: Sequence[str], is_range: NDArray[np.bool_]) -> tuple[str, ...]:
+    """The parameters that are constant and not known."""
+    expect_kind("constant", constant, (bool, str, Sequence), "True, a name of a parameter, or a list of names")
+    chosen = ([*parameters] if constant else []) if isinstance(constant, bool) else constant
+    names = _names("constant", [chosen] if isinstance(chosen, str) else chosen)
+    for name in names:
+        known = f"any of the parameters {', '.join(parameters)}" if parameters else "nothing, there is no parameter"
+        expect(name in parameters, "constant", name, known)
+    return tuple(name for name, free in zip(parameters, is_range, strict=True) if free and name in names)
 
 
 def _varying(varying: Any, disturbances: Sequence[str], parameters: Sequence[str]) -> NDArray[np.bool_]:

@@ -36,7 +36,9 @@ class Sizes(NamedTuple):
     u: int
 
 
-def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequence[str] | None) -> Tape:
+def traced(
+    what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequence[str] | None, kept: Sequence[str] = ()
+) -> Tape:
     """The tape of a function whose arguments are named u, w and p, and one by any other name, which is the state.
 
     Parameters
@@ -50,6 +52,8 @@ def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequ
         Values of parameters that are constants, NaN for the others.
     names : sequence of str, optional
         Those of the rows; by default as many as it returns.
+    kept : sequence of str
+        Parameters that are coordinates after the states instead of with the others.
 
     Raises
     ------
@@ -58,9 +62,13 @@ def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequ
     """
     recorder, vectors, first = Recorder(), {}, 0
     sizes = Sizes(*map(len, symbols))
-    for letter, size in zip(ORDER, sizes, strict=True):
+    own = sizes._replace(x=sizes.x + len(kept), p=sizes.p - len(kept))
+    for letter, size in zip(ORDER, own, strict=True):
         vectors[letter] = variables(recorder, first, size)
         first += size
+    vectors["x"], states = vectors["x"][: sizes.x], iter(vectors["x"][sizes.x :])
+    others = iter(vectors["p"])
+    vectors["p"] = np.array([next(states if name in kept else others) for name in symbols.p], dtype=object)
     for j in np.flatnonzero(~np.isnan(fixed)):
         vectors["p"][j] = recorder.constant(float(fixed[j]))
     if isinstance(function, Mapping):
@@ -82,6 +90,16 @@ def traced(what: str, function: Any, symbols: Symbols, fixed: Array, names: Sequ
         found = list(found)
         names = [f"y[{i}]" for i in range(len(found))]
     return Tape.of(recorder, rows_of(what, found, recorder, names), first)
+
+
+def with_kept(tape: Tape, n: int, kept: int, continuous: bool) -> Tape:
+    """The tape of f of n states with rows for parameters that are kept: zero, or in discrete time as they are."""
+    if not kept:
+        return tape
+    recorder = Recorder()
+    z = list(variables(recorder, 0, tape.variables))
+    rest = [recorder.constant(0.0)] * kept if continuous else z[n : n + kept]
+    return Tape.of(recorder, [*tape.record(z, recorder), *rest], tape.variables)
 
 
 class OfVectors:

@@ -110,6 +110,7 @@ class WindowObserver(Observer):
         slack = relative_slack(eps)
         expect(is_count(sign_split, 0), "sign_split", sign_split, "a number of cells >= 0 (0 = convex hulls)")
         rows = template_rows(template, model.n_states)
+        initial = self._whole(initial)
         lower, upper = first_box(initial, self.model)
         if isinstance(model, NonlinearModel):
             model.check_first(lower, upper)
@@ -201,11 +202,17 @@ class WindowObserver(Observer):
 
     def reset(self, set: HPolytope) -> None:
         if self._plant is not None:
+            set = self._whole(set)
             self._plant.model.check_first(*first_box(set, self.model))
         super().reset(set)
 
     def restart(self, set: HPolytope) -> None:
-        super().reset(set)
+        super().reset(self._whole(set))
+
+    def _whole(self, set: HPolytope) -> HPolytope:
+        """A set of states with the parameters that are some."""
+        known = self._plant is not None and isinstance(set, HPolytope)
+        return self._plant.model.whole(set) if self._plant is not None and known else set
 
     # -- the hooks -------------------------------------------------------------------------------
 

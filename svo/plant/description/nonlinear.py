@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from svo.models.nonlinear import NonlinearModel
 from svo.plant.description.faults import KEYS, FaultModel, check_name, fault_of
 from svo.plant.description.model import ARRAYS, range_of, stamps_of
 from svo.plant.description.table import Table
 
 _MODEL = (
-    "dynamics", "outputs", "disturbances", "n", "physical", "valid", "largest", "varying", "continuous",
+    "dynamics", "outputs", "disturbances", "n", "physical", "valid", "largest", "varying", "constant", "continuous",
     "jitter",
 )  # fmt: skip
 _FAULTS = {"sensor": KEYS["sensor"], "actuator": KEYS["actuator"], "plant": (*ARRAYS, "magnitude")}
@@ -44,7 +46,8 @@ def nonlinear_model_of(top: Table, names: Mapping[str, Sequence[str]]) -> Nonlin
             dynamics, outputs, states=list(dynamics), inputs=names["inputs"], outputs=names["outputs"],
             disturbances=list(bounds), w=([low for low, _ in bounds.values()], [high for _, high in bounds.values()]),
             parameters=_numbers(top.table("parameters")), Ts=top.number("Ts"), n=table.array("n"),
-            varying=table.content.get("varying", ()), continuous=table.truth("continuous", True),
+            varying=table.content.get("varying", ()), constant=table.content.get("constant", False),
+            continuous=table.truth("continuous", True),
             jitter=stamps_of(table) if "jitter" in table else None, **ranges,
         )  # fmt: skip
 
@@ -79,12 +82,18 @@ def _parameters(table: Table, nominal: NonlinearModel) -> FaultModel:
         raise table.error("contains_nominal", "has no meaning where only bounds change, which are compared; drop it")
     own: dict[str, Any] = {"f": nominal.f, "h": nominal.h}
     equations: dict[str, Any] = {name: {**own[name], **changes} for name, changes in rows.items()}
+    still = tuple(name for name in nominal.kept if name not in changed)  # a fault moves it
     with table.errors():
-        model = nominal.replace(parameters={**nominal.parameters, **changed}, **equations)
+        model = nominal.replace(parameters={**nominal.parameters, **changed}, constant=still, **equations)
     if rows:
         return FaultModel(model, table.truth("contains_nominal", False))
-    (low, high), (least, most) = model.flow.w, nominal.flow.w
-    return FaultModel(model, contains_nominal=bool((low <= least).all() and (high >= most).all()))
+    return FaultModel(model, contains_nominal=all(_contains(model, nominal, name) for name in changed))
+
+
+def _contains(wider: NonlinearModel, model: NonlinearModel, name: str) -> bool:
+    """Whether bounds of a parameter hold those of another model."""
+    (low, high), (least, most) = (np.broadcast_to(m.parameters[name], 2) for m in (wider, model))
+    return bool(low <= least and high >= most)
 
 
 def _texts(table: Table, key: str) -> dict[str, str]:

@@ -113,7 +113,8 @@ class DescribedPlant(Shown):
         if self.global_set is None:
             return ArchitectureI(nominal, faults, **self.bank_options)
         class_one = tuple(name for name, fault in self.faults.items() if fault.contains_nominal)
-        return ArchitectureII(nominal, faults, self.global_set, class_one=class_one, **self.bank_options)
+        whole = self.model.whole(self.global_set) if isinstance(self.model, NonlinearModel) else self.global_set
+        return ArchitectureII(nominal, faults, whole, class_one=class_one, **self.bank_options)
 
     def scheduler(self) -> Callable[[NDArray[np.float64]], Any]:
         """A described model has no schedule."""
@@ -160,11 +161,11 @@ def read_description(path: str | Path) -> DescribedPlant:
     else:
         model = model_of(top, {group: found for group, found in names.items() if found})
         faults = faults_of(top, model, names)
-    initial = box_of(top.table("initial"), model.n_states)
+    initial = _box(top, "initial", model)
     if isinstance(model, NonlinearModel):
         with top.table("initial").errors():
-            model.check_first(*first_box(initial, model))
-    _check_architecture(top, faults)
+            model.check_first(*first_box(model.whole(initial), model))
+    _check_architecture(top, model, faults)
     dialect = dialect_of(top, columns)
     if dialect is not None and dialect.events:
         _check_takes_events(top, model, faults)
@@ -176,7 +177,7 @@ def read_description(path: str | Path) -> DescribedPlant:
         initial=initial,
         faults=faults,
         observer=_observer_settings(top, model, initial),
-        global_set=box_of(top.table("global"), model.n_states) if "global" in top else None,
+        global_set=_box(top, "global", model) if "global" in top else None,
         bank_options=_bank_options(top),
         files=_files(path, top.table("model")),
         interval=interval_settings(top, columns),
@@ -194,6 +195,11 @@ def _check_takes_events(top: Table, model: Model, faults: Mapping[str, FaultMode
             "times", 'is "events", and a model is in discrete time, which has no other steps than Ts; state continuous '
             "= true in [model] with arrays of dx/dt"
         )  # fmt: skip
+
+
+def _box(top: Table, key: str, model: Model) -> HPolytope:
+    """A set of states; of a nonlinear plant those of its equations, without parameters that are constant."""
+    return box_of(top.table(key), len(model.states) if isinstance(model, NonlinearModel) else model.n_states)
 
 
 def _wider(model: Model, widening: Array) -> Model:
@@ -250,13 +256,18 @@ def _bank_options(top: Table) -> dict[str, int]:
     return options
 
 
-def _check_architecture(top: Table, faults: Mapping[str, FaultModel]) -> None:
+def _check_architecture(top: Table, model: Model, faults: Mapping[str, FaultModel]) -> None:
     class_two = [name for name, fault in faults.items() if not fault.contains_nominal]
     if class_two and "global" not in top:
         raise top.error(
             None,
             f"the model of fault {class_two[0]!r} need not contain the nominal plant, so its observer needs a set to "
             "start from: add [global] with bounds that the state never leaves, or contains_nominal = true",
+        )
+    moved = [name for name, fault in faults.items() if fault.model.n_states != model.n_states]
+    if "global" in top and moved:
+        raise top.error(
+            "global", f"starts fault {moved[0]!r}, which moves a constant parameter and has other states; free it"
         )
     if "global" in top and not faults:
         raise top.error("global", "has no meaning without faults; drop it, or add [faults.NAME]")
