@@ -1,7 +1,7 @@
 """Soundness of nonlinear models in window observers, at every sample: sets, verdicts, and each linearisation used.
 
 Run with ``python -m benchmarks.nonlinear --samples 100000 --out nonlinear.jsonl``; what the file already holds is not
-run again, so that it may be interrupted at any time. Batch i of a plant is drawn from seed (SEED, plant, i): a dozen
+run again, so that it may be interrupted at any time. Batch i of a plant is drawn from seed (SEED, plant, i): 36
 runs with w, p and noise at corners, inside, or w and p constant at a corner; in every second batch all w and p vary
 inside samples at random times; in two of four the units are other powers of two; in one of three the samples come at
 random intervals, Ts +-90 %. Runaways (a reactor that ignites) are counted apart. Exit code 1 if anything is excluded or
@@ -33,7 +33,7 @@ from tests.svo.models.random_nonlinear import random_plant
 from tests.svo.models.units import in_other_units
 
 SEED = 20_261_129
-RUN, BATCH = 100, 12  # samples of a run, runs of a batch
+RUN, BATCH = 100, 36  # samples of a run, runs of a batch
 MODES = ("corners", "inside", "constant")
 INTERVALS = 0.9  # of Ts
 RANDOM = 20

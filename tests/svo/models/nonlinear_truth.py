@@ -17,8 +17,8 @@ from svo.models.draws import draw
 from svo.models.nonlinear import NonlinearModel
 from tests.svo.models.nonlinear_plants import Case
 
-FINEST, SLIDING = 2.0**-14, 2.0**-6  # of a sample, or of a part of it
-FEW = 30  # steps that were too short to be halved once more: from there on it slides
+FINEST, SLIDING = 2.0**-12, 2.0**-5  # of a sample, or of a part of it
+FEW = 4  # steps that were too short to be halved once more: from there on it slides
 TOLERANCE = 1e-4  # of the remainder over a small box
 PIECES = 4  # of a sample, between which what varies may switch
 

@@ -79,7 +79,7 @@ def test_the_truth_is_what_is_known_of_plants_that_can_be_solved() -> None:
     end, _ = advanced(
         mass, np.array([[0.0, 0.0], [1.0, 3.0]]), nothing, nothing, np.full(2, 2.0), np.full((2, 1), 1e-6)
     )
-    assert np.abs(end[:, 0] - [0.5, 0.0]).max() < 0.05  # where it slides, a 64th of the sample
+    assert np.abs(end[:, 0] - [0.5, 0.0]).max() < 0.1  # where it slides, a 32nd of the sample
     assert np.abs(end[:, 1] - [4.0, 1.0]).max() < 1e-6
     f = called(cstr().model.f, cstr().model)
     x, w, u = np.array([[0.5], [350.0]]), np.array([[0.001], [0.1]]), np.array([[300.0]])
