@@ -131,28 +131,40 @@ static void multiplied(const form *a, const form *b, fdi_interval values, const 
     rounded(found, size, s);
 }
 
-/* a / b = q + (a - q b) / b: with q that of the centres, what a and b have in common leaves the numerator. */
+/* a / b = q + (a - q b) / b for every q; `over` is 1 / b. */
+static void shared(const form *a, const form *b, const form *over, double q, const support *s, form *spare, form *found)
+{
+    form *part = spare, *left = spare + 1, *whole = spare + 2, *constant = spare;
+    form_sloped(b, q, at(0.0), product(at(q), b->range), s, part);
+    form_sum(a, part, -1.0, difference(a->range, part->range), s, left);
+    multiplied(left, over, product(left->range, over->range), s, whole);
+    form_of_constant(constant, at(q), s);
+    form_sum(constant, whole, 1.0, sum(at(q), whole->range), s, found);
+}
+
+/* With q that of the centres, what a and b have in common leaves the numerator; with q that of their slopes the
+ * numerator becomes nearly constant, and the rest is that of 1 / b. */
 static void divided(const form *a, const form *b, fdi_interval values, const support *s, form *spare, form *found)
 {
-    form *over = spare, *part = spare + 1, *left = spare + 2, *whole = spare + 3, *shared = spare + 4, *q_form = spare + 5;
+    form *over = spare, *other = spare + 1;
+    double along = 0.0, square_b = 0.0;
+    for EACH(j, s) {
+        const double p = b->g[j] * s->radius[j];
+        along += a->g[j] * s->radius[j] * p, square_b += p * p;
+    }
+    const double shares[] = {a->k / b->k, along / square_b};
     const fdi_interval inverted = inverse(b->range);
     const secant by = tape_secant(INV, b->range, inverted);
     form_sloped(b, by.slope, by.rest, inverted, s, over);
     multiplied(a, over, product(a->range, over->range), s, found);
-    const double q = a->k / b->k;
-    if (!(fabs(q) < 1e300)) {
-        form_within(found, values, s);
-        return;
+    for (integer i = 0; i < 2; i++) {
+        if (!(fabs(shares[i]) < 1e300)) continue;
+        shared(a, b, over, shares[i], s, spare + 2, other);
+        const fdi_interval p = found->range, q = other->range;
+        if (width(other->rest) < width(found->rest)) copied(other, s, found);
+        form_within(found, interval(larger(p.low, q.low), smaller(p.high, q.high)), s);
     }
-    const fdi_interval scaled_b = product(at(q), b->range);
-    form_sloped(b, q, at(0.0), scaled_b, s, part);
-    form_sum(a, part, -1.0, difference(a->range, part->range), s, left);
-    multiplied(left, over, product(left->range, over->range), s, whole);
-    form_of_constant(q_form, at(q), s);
-    form_sum(q_form, whole, 1.0, sum(at(q), whole->range), s, shared);
-    const fdi_interval plain = found->range;
-    if (width(shared->rest) < width(found->rest)) copied(shared, s, found);
-    form_within(found, interval(larger(plain.low, shared->range.low), smaller(plain.high, shared->range.high)), s);
+    form_within(found, values, s);
 }
 
 /* b + max(a - b, 0), where either may be the larger one. */

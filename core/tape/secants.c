@@ -2,8 +2,8 @@
  *
  * Any slope would be sound, so slopes are computed in doubles; what they leave out is bounded with outward rounding. A
  * chord and the parallel tangent enclose a convex or concave function (Chebyshev's slope, as in affine arithmetic: de
- * Figueiredo and Stolfi, Numerical Algorithms 37 (2004)); sin and cos take one-sided bounds of second order; what bends
- * both ways, the signed root and tanh, takes the slope that leaves out least.
+ * Figueiredo and Stolfi, Numerical Algorithms 37 (2004)); sin and cos take one-sided bounds of second order, piece by piece
+ * where an interval is wide; what bends both ways takes the slope that leaves out least.
  */
 #include "tape/tape.h"
 
@@ -184,17 +184,67 @@ static secant of_wave(fdi_interval a, fdi_interval values, double m, fdi_interva
     return narrower((secant){q, sum(sum(anchor, tilt), bend)}, values);
 }
 
-static secant of_operation(integer op, fdi_interval a, fdi_interval values)
+/* Where an interval is so wide that sin or cos bends both ways: bounds of second order on each of its pieces. */
+enum { MOST_PIECES = 32 };
+static const double PIECE = 0.25, BENDS_BOTH_WAYS = 0.5, FAR = 0x1p30;
+
+typedef struct {
+    ends e; /* first, so that a pointer to it is one to all */
+    integer count;
+    double reach, centre[MOST_PIECES];
+    fdi_interval value[MOST_PIECES], slope[MOST_PIECES], bend[MOST_PIECES];
+} pieces;
+
+static fdi_interval rest_of_pieces(const ends *e, double q)
+{
+    const pieces *p = (const pieces *)e;
+    fdi_interval rest = {INFINITY, -INFINITY};
+    for (integer i = 0; i < p->count; i++) {
+        const double tilt = above(magnitude(difference(p->slope[i], at(q))) * p->reach);
+        const fdi_interval straight = sum(rest_at(p->value[i], q, p->centre[i]), interval(-tilt, tilt));
+        const fdi_interval piece = sum(straight, p->bend[i]);
+        rest = interval(smaller(rest.low, piece.low), larger(rest.high, piece.high));
+    }
+    return rest;
+}
+
+static secant of_pieces(integer op, fdi_interval a)
+{
+    pieces p = {.e.a = a, .count = (integer)ceil(width(a) / PIECE)};
+    const double step = width(a) / (double)p.count;
+    p.reach = above(0.5 * step + 4.0 * EPS * magnitude(a)); /* centres are rounded */
+    const fdi_interval half = interval(0.0, product(at(0.5), square(at(p.reach))).high);
+    for (integer i = 0; i < p.count; i++) {
+        const double c = p.centre[i] = a.low + ((double)i + 0.5) * step;
+        const fdi_interval sine = fdi_sin_at(c), cosine = fdi_cos_at(c);
+        p.value[i] = op == SIN ? sine : cosine;
+        p.slope[i] = op == SIN ? cosine : opposite(sine);
+        /* The second derivative is minus the function, which changes by at most `reach`. */
+        p.bend[i] = product(half, opposite(sum(p.value[i], interval(-p.reach, p.reach))));
+    }
+    return narrowest(rest_of_pieces, &p.e, -1.0, 1.0);
+}
+
+static secant of_sine_or_cosine(integer op, fdi_interval a, fdi_interval values)
 {
     const double m = middle(a);
+    const fdi_interval sine = fdi_sin_at(m), cosine = fdi_cos_at(m);
+    const secant one = op == SIN ? of_wave(a, values, m, sine, cosine) : of_wave(a, values, m, cosine, opposite(sine));
+    const int pays = width(a) > BENDS_BOTH_WAYS && width(a) <= MOST_PIECES * PIECE && magnitude(a) < FAR;
+    const secant many = pays ? of_pieces(op, a) : one;
+    return width(many.rest) < width(one.rest) ? many : one;
+}
+
+static secant of_operation(integer op, fdi_interval a, fdi_interval values)
+{
     switch (op) {
     case SQR: return of_square(a);
     case INV: return of_inverse(a, values);
     case SQRT: return of_root(a, values);
     case EXP: return of_exponential(a, values);
     case LOG: return of_logarithm(a, values);
-    case SIN: return of_wave(a, values, m, fdi_sin_at(m), fdi_cos_at(m));
-    case COS: return of_wave(a, values, m, fdi_cos_at(m), opposite(fdi_sin_at(m)));
+    case SIN:
+    case COS: return of_sine_or_cosine(op, a, values);
     case TANH: return of_tangent(a, values);
     case ABS: return of_magnitude(a);
     case SROOT: return of_signed_root(a, values);

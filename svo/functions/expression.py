@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,7 @@ class Recorder:
     def __init__(self) -> None:
         self.slots: list[Slot] = []
         self._known: dict[Slot, int] = {}
+        self._reads: list[int] = []  # of each slot, the coordinates that it depends on, as bits
 
     def variable(self, j: int) -> Expression:
         """Coordinate j of z."""
@@ -74,11 +77,20 @@ class Recorder:
         return self.put(Op.MUL, a, b)
 
     def quotient(self, a: Any, b: Any) -> Expression:
-        """a / b; a product with 1 / b where one of them is a constant."""
+        """a / b; a product with 1 / b where one of them is a constant.
+
+        Factors of a that have nothing in common with b stay outside: a quotient is narrow where a and b move together.
+        """
         a, b = self.constant(a), self.constant(b)
         if Op.CONSTANT in (self.slots[a.slot][0], self.slots[b.slot][0]):
             return self.product(a, self.put(Op.INV, b))
-        return self.put(Op.DIV, a, b)
+        factors = [a.slot] if self.slots[a.slot][0] is not Op.MUL else self._factors(a.slot)
+        shared = [i for i in factors if self._reads[i] & self._reads[b.slot]]
+        if len(shared) in (0, len(factors)):
+            return self.put(Op.DIV, a, b)
+        apart = [Expression(self, i) for i in factors if i not in shared]
+        over = self.put(Op.DIV, reduce(self.product, [Expression(self, i) for i in shared]), b)
+        return self.product(reduce(self.product, apart), over)
 
     def enclosed(self, values: Interval) -> Expression:
         """A constant that an interval contains."""
@@ -90,6 +102,9 @@ class Recorder:
         index = self._known.setdefault(slot, len(self.slots))
         if index == len(self.slots):
             self.slots.append(slot)
+            op, of, values = slot
+            own = 1 << int(values[0]) if op is Op.VARIABLE else 0
+            self._reads.append(reduce(or_, (self._reads[i] for i in of), own))
         return Expression(self, index)
 
     # -- sign(e) sqrt(|e|) ---------------------------------------------------------------------------

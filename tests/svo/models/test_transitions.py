@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from svo.checks import Array
+from svo.functions import cos, sin
 from svo.models.nonlinear import NonlinearModel, Undecided
 from svo.models.nonlinear.simulation import integrated
 from tests.svo.models.nonlinear_plants import CASES, Case, cstr, pendulum, three_tanks
@@ -157,24 +158,43 @@ def test_a_state_that_is_pulled_back_is_enclosed_by_its_own_ends() -> None:
         assert ((x >= box.lower) & (x <= box.upper)).all()
 
 
-def test_a_quotient_keeps_what_its_parts_have_in_common() -> None:
+@pytest.mark.parametrize("growth", [lambda s, mu: mu * s / (0.2 + s), lambda s, mu: mu * (s / (s + 0.2))])
+def test_a_quotient_keeps_what_its_parts_have_in_common(growth) -> None:
     """Monod's growth, whose numerator and denominator rise together; as a product with 1 / (K + s) it is far wider."""
 
-    def model(growth):
+    def model(rate):
         return NonlinearModel(
-            lambda x, p: [growth(x[0], p[0])], lambda x: x, states=["s"], parameters={"mu": (0.48, 0.52)},
+            lambda x, p: [rate(x[0], p[0])], lambda x: x, states=["s"], parameters={"mu": (0.48, 0.52)},
             Ts=1.0, largest=([0], [9]), continuous=False,
         )  # fmt: skip
 
-    one, other = (model(g) for g in (lambda s, mu: mu * s / (0.2 + s), lambda s, mu: mu * s * (1.0 / (0.2 + s))))
+    one, other = model(growth), model(lambda s, mu: mu * s * (1.0 / (0.2 + s)))
     for low, high in (0.2, 0.4), (0.1, 1.0), (0.0, 8.0):
         ours, product = one.transition([low], [high]), other.transition([low], [high])
         s = np.linspace(low, high, 50)
         for mu in (0.48, 0.5, 0.52):
             rest = mu * s / (0.2 + s) - s * ours.A[0, 0] - ours.a[0] - mu * ours.E[0, 0]
             assert (np.abs(rest) <= ours.R[0] + 1e-15).all()
-        assert ours.R[0] < 0.75 * product.R[0], (low, high)
-        assert ours.box.width[0] < product.box.width[0]
+        q = 0.2 / ((0.2 + low) * (0.2 + high))  # of the chord, to which the curve's largest distance is known
+        chord = 0.5 * 0.5 * (np.sqrt(1.0 / (0.2 + low)) - np.sqrt(1.0 / (0.2 + high))) ** 2 * 0.2
+        mixed = 0.5 * 0.02 * q * (high - low)
+        assert ours.R[0] < 1.3 * (chord + mixed) + 1e-9, (low, high)
+        assert ours.R[0] < 0.6 * product.R[0]
+
+
+@pytest.mark.parametrize(
+    ("wave", "low", "high"), [(sin, -1.5, 1.5), (cos, 0.1, 3.0), (sin, -0.3, 0.9), (cos, -2.0, 3.5)]
+)
+def test_a_wave_over_a_wide_interval_leaves_out_little_more_than_it_must(wave, low: float, high: float) -> None:
+    model = NonlinearModel(
+        lambda x: [wave(x[0])], lambda x: x, states=["s"], Ts=1.0, largest=([-9], [9]), continuous=False
+    )
+    found, s = model.transition([low], [high]), np.linspace(low, high, 4001)
+    slopes = np.linspace(-1.0, 1.0, 2001)[:, None]
+    rest = wave(s) - slopes * s
+    least = 0.5 * float((rest.max(axis=1) - rest.min(axis=1)).min())
+    assert (np.abs(wave(s) - found.A[0, 0] * s - found.a[0]) <= found.R[0]).all()
+    assert found.R[0] < least + 0.02
 
 
 def test_a_face_of_the_physical_range_may_be_touched() -> None:

@@ -149,17 +149,19 @@ class Box(NamedTuple):
         return self.rounded(a.k * b.k, g, (low, high), mul(a.range, b.range), size)
 
     def quotient(self, a: Form, b: Form) -> Form:
-        """a / b = q + (a - q b) / b: with q that of the centres, what a and b have in common leaves the numerator."""
+        """a / b = q + (a - q b) / b, with q of the centres and with q of the slopes; or the product with 1 / b."""
         over = self.applied(Op.INV, b)
-        plain = self.product(a, over)
-        q = a.k / b.k if b.k else math.inf
-        if not abs(q) < 1e300:
-            return plain
-        point = q, q
-        left = self.difference(a, self.sloped(b, q, (0.0, 0.0), mul(point, b.range)))
-        shared = self.total(self.constant(point), self.product(left, over))
-        best, other = sorted((plain, shared), key=lambda form: form.rest[1] - form.rest[0])
-        return self._within(best, other.range)
+        best = self.product(a, over)
+        p, r = ([v * w for v, w in zip(of.g, self.radius, strict=True)] for of in (a, b))
+        squares = sum([v * v for v in r])
+        along = sum([v * w for v, w in zip(p, r, strict=True)]) / squares if squares else math.inf
+        for q in (a.k / b.k if b.k else math.inf, along):
+            if abs(q) < 1e300:
+                left = self.difference(a, self.sloped(b, q, (0.0, 0.0), mul((q, q), b.range)))
+                other = self.total(self.constant((q, q)), self.product(left, over))
+                best, worse = sorted((best, other), key=lambda form: form.rest[1] - form.rest[0])
+                best = self._within(best, worse.range)
+        return best
 
     def maximum(self, a: Form, b: Form) -> Form:
         """The larger one of two: b + max(a - b, 0)."""

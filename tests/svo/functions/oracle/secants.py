@@ -19,6 +19,7 @@ from svo.functions.operations import Op
 from tests.svo.functions.oracle.intervals import Interval, add, applied, ball_below, down, inv, mul, neg, sqr, sub, up
 
 _GOLDEN = 0.6180339887498949
+_PIECE = 0.25  # of a wide argument of sin and cos
 _NEAR = 1e-7  # relative width of [a, b] below which a chord's slope is lost to rounding
 
 
@@ -179,12 +180,39 @@ def _tanh_rest(a: Interval, q: float) -> Interval:
 
 def _sin(a: Interval, values: Interval) -> tuple[float, Interval]:
     m = arb(middle := 0.5 * a[0] + 0.5 * a[1])
-    return _second_order(a, values, middle, m.sin(), m.cos(), neg(values))
+    return _narrower(a, Op.SIN, _second_order(a, values, middle, m.sin(), m.cos(), neg(values)))
 
 
 def _cos(a: Interval, values: Interval) -> tuple[float, Interval]:
     m = arb(middle := 0.5 * a[0] + 0.5 * a[1])
-    return _second_order(a, values, middle, m.cos(), -m.sin(), neg(values))
+    return _narrower(a, Op.COS, _second_order(a, values, middle, m.cos(), -m.sin(), neg(values)))
+
+
+def _narrower(a: Interval, op: Op, one: tuple[float, Interval]) -> tuple[float, Interval]:
+    """Second order on each of many pieces of a wide interval, where that is narrower."""
+    width = a[1] - a[0]
+    if not (0.5 < width <= 32 * _PIECE and max(abs(a[0]), abs(a[1])) < 2.0**30):
+        return one
+    count = math.ceil(width / _PIECE)
+    step = width / count
+    reach = up(0.5 * step + 4.0 * 2.0**-52 * max(abs(a[0]), abs(a[1])))
+    half = mul((0.5, 0.5), sqr((reach, reach)))[1]
+    parts = []
+    for i in range(count):
+        c = a[0] + (i + 0.5) * step
+        sine, cosine = applied(Op.SIN, (c, c)), applied(Op.COS, (c, c))
+        value, slope = (sine, cosine) if op is Op.SIN else (cosine, neg(sine))
+        parts.append((c, value, slope, mul((0.0, half), neg(add(value, (-reach, reach))))))
+
+    def rest(q: float) -> Interval:
+        ends = []
+        for c, value, slope, bend in parts:
+            tilt = up(max(map(abs, sub(slope, (q, q)))) * reach)
+            ends += add(add(sub(value, mul((q, q), (c, c))), (-tilt, tilt)), bend)
+        return min(ends), max(ends)
+
+    many = _narrowest(rest, -1.0, 1.0)
+    return many if _width(many[1]) < _width(one[1]) else one
 
 
 def _second_order(
