@@ -9,15 +9,14 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
 from svo import WindowObserver
 from svo.checks import Array
-from svo.models.nonlinear import LinearOutput, NonlinearModel, Span, Transition
+from svo.models.nonlinear import Linearisation, NonlinearModel, Span
 from svo.observers.base import Step
 from tests.svo.models.nonlinear_plants import Case
 from tests.svo.models.nonlinear_truth import Runs, called
@@ -29,10 +28,10 @@ ROUNDING = 1e-12  # of the sizes of the terms: what the truth in floats cannot t
 
 
 class Watched(NonlinearModel):
-    """A model that keeps what it was asked for since it was last looked at."""
+    """A model that keeps what an observer linearised since it was last looked at."""
 
-    moves: list[Transition]
-    outputs_given: list[LinearOutput]
+    moves: list[tuple[Linearisation, Span]]
+    readings: list[Linearisation]
 
     @classmethod
     def of(cls, model: NonlinearModel) -> Watched:
@@ -41,33 +40,34 @@ class Watched(NonlinearModel):
         f, h = given.pop("f"), given.pop("h")
         made = cls(f, h, **given)
         object.__setattr__(made, "moves", [])
-        object.__setattr__(made, "outputs_given", [])
+        object.__setattr__(made, "readings", [])
         return made
-
-    def transition(self, lower: ArrayLike, upper: ArrayLike, u: ArrayLike = (), *, dt: Any = None) -> Transition:
-        found = super().transition(lower, upper, u, dt=dt)
-        self.moves.append(found)
-        return found
 
     @cached_property
     def kernel(self) -> Any:
-        return _Watching(NonlinearModel.kernel.func(self), self.outputs_given)
+        return _Watching(NonlinearModel.kernel.func(self), self)
 
 
 class _Watching:
-    """A kernel whose outputs of samples are kept."""
+    """A kernel that notes what it gives."""
 
-    def __init__(self, kernel: Any, given: list[LinearOutput]) -> None:
-        self._kernel, self._given = kernel, given
+    def __init__(self, kernel: Any, model: Watched) -> None:
+        self._kernel, self._model = kernel, model
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._kernel, name)
 
-    def measured(self, *arguments: Any) -> tuple[LinearOutput, Span]:
+    def measured(self, *arguments: Any) -> tuple[Linearisation, Span]:
         """As the kernel's own."""
-        output, left = self._kernel.measured(*arguments)
-        self._given.append(output)
-        return output, left
+        found, left = self._kernel.measured(*arguments)
+        self._model.readings.append(found)
+        return found, left
+
+    def moved(self, *arguments: Any) -> tuple[Linearisation, Span]:
+        """As the kernel's own."""
+        found, left = self._kernel.moved(*arguments)
+        self._model.moves.append((found, left))
+        return found, left
 
 
 @dataclass
@@ -142,12 +142,28 @@ def _is_normal(case: Case, x: Array) -> bool:
     return case.normal is None or bool(((case.normal[0] <= x) & (x <= case.normal[1])).all())
 
 
+class _Move(NamedTuple):
+    """The parts of a transition, as an observer gets them: the remainders are the last columns of its E."""
+
+    A: Array
+    a: Array
+    E: Array
+    R: Array
+
+    @classmethod
+    def of(cls, found: Linearisation, n: int) -> _Move:
+        """From the linearisation of a sample."""
+        nw = found.E.shape[1] - n
+        return cls(found.A, found.a, found.E[:, :nw], np.diagonal(found.E[:, nw:]))
+
+
 def _check_moves(model: Watched, one: Runs, k: int, found: Findings, where: str) -> None:
     """The true transition from sample k against those that were made of it."""
     if k + 1 >= len(one.x):
         return
     held, x, after = ~model.flow.varying, one.x[k], one.x[k + 1]
-    for move in model.moves:
+    for found_here, box in model.moves:
+        move = _Move.of(found_here, len(x))
         size = np.abs(move.A) @ np.abs(x) + np.abs(move.a) + np.abs(move.E) @ (np.abs(one.w[k]) * held)
         rest = np.abs(after - move.A @ x - move.a - move.E @ (one.w[k] * held))
         room = ROUNDING * (size + np.abs(after))
@@ -157,20 +173,22 @@ def _check_moves(model: Watched, one: Runs, k: int, found: Findings, where: str)
         found.count["transitions"] += 1
         if (rest > move.R * (1.0 + PART) + room).any():
             found.failed("transition outside R", f"{where}, {used:.6g} of R")
-        if not ((after >= move.box.lower - room) & (after <= move.box.upper + room)).all():
+        if not ((after >= box.lower - room) & (after <= box.upper + room)).all():
             found.failed("state outside the transition's box", where)
     model.moves.clear()
 
 
 def _check_outputs(model: Watched, h: Any, one: Runs, k: int, found: Findings, where: str) -> None:
     value = h(one.x[k][:, None], one.w[k][:, None], one.u[k][:, None])[:, 0]
-    for output in model.outputs_given:
-        rest = np.abs(value - output.C @ one.x[k] - output.c - output.F @ one.w[k])
-        size = np.abs(output.C) @ np.abs(one.x[k]) + np.abs(output.c) + np.abs(output.F) @ np.abs(one.w[k])
+    nw = len(one.w[k])
+    for at in model.readings:
+        F = at.F[:, :nw]
+        rest = np.abs(value - at.C @ one.x[k] - at.c - F @ one.w[k])
+        size = np.abs(at.C) @ np.abs(one.x[k]) + np.abs(at.c) + np.abs(F) @ np.abs(one.w[k])
         found.count["outputs"] += 1
-        if (rest > output.R + 1e-13 * (size + np.abs(value))).any():
+        if (rest > at.n - model.noise + 1e-13 * (size + np.abs(value) + at.n)).any():
             found.failed("output outside R", where)
-    model.outputs_given.clear()
+    model.readings.clear()
 
 
 MUST_NOT = (
