@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 import svo as face
-from svo.cli.frame import app, one_line_errors
-from svo.cli.options import AsJson
+from svo.cli.destinations import check_new
+from svo.cli.frame import app, chosen_noise, one_line_errors
+from svo.cli.options import Architecture, AsJson, DescribedName, Models, NoiseName, Overwrite
 from svo.cli.output import print_checks, print_json
 
 _WHY_EMPTY = "no model was falsified in what wrote it, or the file was cut off"
@@ -29,6 +30,11 @@ def verify(
         Path | None,
         typer.Option(metavar="LOG", help="Also prove every bound from the first sample of this log to each alarm."),
     ] = None,
+    write_proof: Annotated[
+        Path | None,
+        typer.Option(metavar="PROOF.jsonl.gz", help="With --full: write every step of the proofs, for any checker."),
+    ] = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Check every stored alarm: its digest, its proof in exact arithmetic, and its data if the log is given.
@@ -40,14 +46,18 @@ def verify(
 
     \b
     Example:
-      svo verify findings/alarms.jsonl --full log.csv
+      svo verify findings/alarms.jsonl --full log.csv --write-proof proof.jsonl.gz
     """
     if log is not None and full is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")
     from svo.cli.progress import busy
 
+    if write_proof is not None:
+        if full is None:
+            raise ValueError("--write-proof was given without --full LOG, which makes the proof")
+        check_new(write_proof, overwrite)
     with busy("Proving"):
-        found = face.verify(alarms, log or full, full=full is not None)
+        found = face.verify(alarms, log or full, full=full is not None, write_proof=write_proof)
     if not found.checks:
         # Success would say that something was proven.
         raise ValueError(f"{alarms} holds no alarm, so there is nothing to prove: {_WHY_EMPTY}")
@@ -57,3 +67,37 @@ def verify(
         print_checks(found)
     if not found.ok:
         raise typer.Exit(1)
+
+
+@app.command()
+@one_line_errors()
+def describe(
+    plant: DescribedName,
+    out: Annotated[Path, typer.Option(metavar="PLANT.json", help="File to write.")],
+    noise: NoiseName = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG", help="The log whose scheduling values the matrices are at, if any is scheduled."),
+    ] = None,
+    architecture: Architecture = None,
+    models: Models = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Write the models of a plant's observers, with their bounds and promises, for a checker that is not of ours.
+
+    Floats are in hexadecimal, so that they are the very numbers that the observers take. Of a scheduled model the
+    scheduling value of each sample of the log is an axiom of what is proven.
+
+    \b
+    Example:
+      svo describe eclipse --noise quiet --log flight.csv --out plant.json
+    """
+    from svo.detection.plant_record import plant_record
+    from svo.plant import BankChoice, with_bank
+    from svo.store import write_text
+    from svo.terminal import json_text
+
+    check_new(out, overwrite)
+    found = with_bank(face.find_plant(plant), BankChoice(architecture, models))
+    data = None if log is None else face.read_log(log, found)
+    write_text(out, json_text(plant_record(found, chosen_noise(found, noise), data)) + "\n")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -10,17 +10,19 @@ from time import perf_counter
 import numpy as np
 
 from svo.detection.bank_alarms import bank_of_source, digest_of_alarm, promises_of
+from svo.detection.proof_file import Chain
 from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models import ModelSample, UncertainModel
 from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
-from svo.observers.base import Observer
+from svo.observers.base import Certificate, Observer
 from svo.observers.window.certificate import OnWindow, WindowCertificate
 from svo.observers.window.chain import promises_of as promised
 from svo.observers.window.chain import prover_of, proving, start_of
 from svo.observers.window.observer import WindowObserver
+from svo.observers.window.proof_steps import ProofSteps
 from svo.observers.window.setup import joint_rows
 from svo.plant import BankChoice, MonitoredPlant, with_bank
 from svo.plant.dialects import on_log
@@ -151,52 +153,82 @@ def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[Ala
     return with_chains(checks, read_alarms(path), models) if all(check.ok for check in checks) else checks
 
 
-def with_chains(checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: PlantModels) -> list[AlarmCheck]:
-    """Checks of alarms that hold, each with what is proven of its observer's bounds."""
-    return [_with_chain(check, alarm, models) for check, alarm in zip(checks, alarms, strict=True)]
+def with_chains(
+    checks: Sequence[AlarmCheck],
+    alarms: Sequence[Alarm],
+    models: PlantModels,
+    keep: Callable[[Chain], object] | None = None,
+) -> list[AlarmCheck]:
+    """Checks of alarms that hold, each with what is proven of its observer's bounds.
+
+    What holds is given to ``keep``, step by step, where it can be written.
+    """
+    return [_with_chain(check, alarm, models, keep) for check, alarm in zip(checks, alarms, strict=True)]
 
 
-def _with_chain(check: AlarmCheck, alarm: Alarm, models: PlantModels) -> AlarmCheck:
+def _with_chain(
+    check: AlarmCheck, alarm: Alarm, models: PlantModels, keep: Callable[[Chain], object] | None
+) -> AlarmCheck:
     begun = perf_counter()
-    ok, reason = _prove(models.bank(alarm), alarm, models.log(alarm))
+    steps = None if keep is None else ProofSteps()
+    ok, reason, (started, given) = _prove(models.bank(alarm), alarm, models.log(alarm), steps)
+    if ok and keep is not None and steps is not None:
+        if steps.missing is None:
+            keep(Chain(alarm, started, steps.steps, given))
+        else:
+            reason += f"; not in the proof file: {steps.missing}"
     return replace(check, ok=ok, reason=reason, seconds=check.seconds + perf_counter() - begun)
 
 
-def _prove(bank: Bank, alarm: Alarm, log: Log) -> tuple[bool, str]:
+_NOT_FROM_THE_FIRST = "bounds of {} are not proven from the first sample on; verify without --full"
+_FIRST: tuple[int, str | None] = (0, None)  # where a proof starts, and what its set there rests on
+
+
+def _prove(bank: Bank, alarm: Alarm, log: Log, steps: ProofSteps | None) -> tuple[bool, str, tuple[int, str | None]]:
+    """Whether an alarm is proven, in words, and where its proof starts."""
     replaced: dict[str, WindowObserver] = {}
     splits: dict[str, int] = {}
     for name in (alarm.observer, *(n for n in bank.observers if n == GLOBAL)):
         observer = bank.observers.get(name)
         if not isinstance(observer, WindowObserver):
             kind = "none of that name" if observer is None else f"a {type(observer).__name__}"
-            return False, f"only bounds of window observers can be proven; the plant's bank has {kind} for {name!r}"
+            return _refused(f"only bounds of window observers can be proven; the plant's bank has {kind} for {name!r}")
         if isinstance(observer.model, NonlinearModel):
-            return False, "bounds of a nonlinear model are not proven from the first sample on; verify without --full"
+            return _refused(_NOT_FROM_THE_FIRST.format("a nonlinear model"))
         if observer.jitter is not None:
-            return False, "bounds of a model with jitter are not proven from the first sample on; verify without --full"
-        replaced[name], splits[name] = proving(observer), observer.sign_split
+            return _refused(_NOT_FROM_THE_FIRST.format("a model with jitter"))
+        told = steps if name == alarm.observer else None
+        replaced[name], splits[name] = proving(observer, told), observer.sign_split
     bank.exchange(replaced)
-    started, fell = _replay(bank, alarm.observer, log)
+    own = replaced[alarm.observer]
+    started, fell, proof = _replay(bank, alarm.observer, log)
     if fell != alarm.sample:
         found = "not falsified" if fell is None else f"falsified at sample {fell}"
         split = " over convex hulls, not split by signs as the plant's is," if splits[alarm.observer] else ""
-        return False, f"run again over the log{split} the plant's observer is {found}"
+        return _refused(f"run again over the log{split} the plant's observer is {found}")
     provers = [prover_of(observer) for observer in replaced.values()]
     unproven, bounds = [what for p in provers for what in p.unproven], sum(p.checked for p in provers)
     if unproven:
-        return False, f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}"
-    own = replaced[alarm.observer]
+        return _refused(f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}")
+    if steps is not None and isinstance(proof, WindowCertificate):
+        steps.alarm(own.current_window, proof)
     again, promises = start_of(own, started), "".join(f" and {promise}" for promise in promised(own))
     if again is not None:
-        return True, f"proven over {bounds} bounds, given {again}{promises}"
+        return True, f"proven over {bounds} bounds, given {again}{promises}", (started, None)
     if started == 0:
-        return True, f"proven from the first sample, over {bounds} bounds" + promises.replace(" and", ", given", 1)
+        rests = promises.replace(" and", ", given", 1)
+        return True, f"proven from the first sample, over {bounds} bounds{rests}", _FIRST
     given = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
-    return True, f"proven from its start at sample {started} over {bounds} bounds, given {given}{promises}"
+    reason = f"proven from its start at sample {started} over {bounds} bounds, given {given}{promises}"
+    return True, reason, (started, given)
 
 
-def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None]:
-    """Sample at which the observer last started, and at which its model was declared falsified."""
+def _refused(why: str) -> tuple[bool, str, tuple[int, str | None]]:
+    return False, why, _FIRST
+
+
+def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None, Certificate | None]:
+    """Sample at which the observer last started, that at which its model was declared falsified, and the proof."""
     started, ran = 0, False
     for verdict in drive(bank, log):
         step = verdict.steps.get(name)
@@ -206,5 +238,5 @@ def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None]:
         ran = step is not None and step.verdict != "falsified"
         alive = name in verdict.alive if name != GLOBAL else verdict.state != "unexplained"
         if not alive:
-            return started, verdict.sample
-    return started, None
+            return started, verdict.sample, None if step is None else step.certificate
+    return started, None, None

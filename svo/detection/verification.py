@@ -12,6 +12,8 @@ from polytopes.signatures import options_by_name
 from svo.checks import expect_kind
 from svo.detection.chains import PlantModels, with_chains
 from svo.detection.found import Detection
+from svo.detection.proof_file import Chain
+from svo.detection.proof_file import write_proof as write_proof_file
 from svo.isolation import NOT_CHECKED, Alarm, AlarmCheck, check_alarm, read_alarms, verify_alarms
 from svo.logs.log import Log
 from svo.plant import MonitoredPlant
@@ -98,6 +100,7 @@ def verify(
     *,
     full: bool = False,
     plant: MonitoredPlant | None = None,
+    write_proof: str | Path | None = None,
 ) -> Verification:
     """Check alarms: the digest of those stored, each proof in exact arithmetic, and data and model if the log is given.
 
@@ -115,6 +118,8 @@ def verify(
         again (some seconds an alarm).
     plant : MonitoredPlant, optional
         The one that stored alarms are of; by default it is found by its name, a description beside them.
+    write_proof : path, optional
+        With ``full``: every step of the proofs is written there, for checkers of others (`docs/proof_format.md`).
 
     Returns
     -------
@@ -127,22 +132,28 @@ def verify(
         If ``alarms`` is neither a detection nor a path.
     ValueError
         If the file is none of alarms, or has those of several runs and a log is given, if the plant is not found, and
-        for ``full`` without a log, or a log or plant beside a detection.
+        for ``full`` without a log, for ``write_proof`` without ``full`` or where no proof can be written, or a log or
+        plant beside a detection.
     OSError
         If a file cannot be opened.
     """
     expect_kind("alarms", alarms, (Detection, str, Path), "what svo.detect gives, or the path of an alarms.jsonl")
+    if write_proof is not None and not full:
+        raise ValueError("write_proof is given and full is not True; the steps of a proof come with it")
+    out = None if write_proof is None else Path(write_proof)
     if not isinstance(alarms, Detection):
-        return _verified_file(Path(alarms), log, full, plant)
+        return _verified_file(Path(alarms), log, full, plant, out)
     if log is not None or plant is not None:
         raise ValueError("log or plant is given beside a detection, which has its own; leave them out")
     models = PlantModels(alarms.plant, alarms.log)
     checks = [check_alarm(alarm, alarms.log, models.difference) for alarm in alarms.alarms]
     about = f"alarms of {alarms.log.source or 'the log'}"
-    return Verification(about, _completed(checks, alarms.alarms, models, full), "" if full else _START)
+    return Verification(about, _completed(checks, alarms.alarms, models, full, out), "" if full else _START)
 
 
-def _verified_file(path: Path, log: Log | str | Path | None, full: bool, plant: MonitoredPlant | None) -> Verification:
+def _verified_file(
+    path: Path, log: Log | str | Path | None, full: bool, plant: MonitoredPlant | None, out: Path | None
+) -> Verification:
     if log is None and full:
         raise ValueError("full is True and there is no log; give the log that the alarms are of")
     alarms = [] if log is None else _of_one_run(path)
@@ -152,15 +163,23 @@ def _verified_file(path: Path, log: Log | str | Path | None, full: bool, plant: 
     found = plant or find_plant(str(alarms[0].source.get("plant")), path.parent)
     data = log if isinstance(log, Log) else read_log(log, found)
     models = PlantModels(found, data)
-    checks = _completed(verify_alarms(path, data, models.difference), alarms, models, full)
+    checks = _completed(verify_alarms(path, data, models.difference), alarms, models, full, out)
     return Verification(str(path), checks, "" if full else _START)
 
 
 def _completed(
-    checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: PlantModels, full: bool
+    checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: PlantModels, full: bool, out: Path | None
 ) -> tuple[AlarmCheck, ...]:
-    """The checks, with chains of bounds if all hold and these are asked for."""
-    return tuple(with_chains(checks, alarms, models) if full and all(check.ok for check in checks) else checks)
+    """The checks, with chains of bounds if all hold and these are asked for, which are then written."""
+    if not full or not all(check.ok for check in checks):
+        return tuple(checks)
+    chains: list[Chain] = []
+    found = with_chains(checks, alarms, models, None if out is None else chains.append)
+    if out is not None:
+        if not chains:
+            raise ValueError(f"no proof can be written: {found[0].reason if found else 'there is no alarm'}")
+        write_proof_file(out, chains)
+    return tuple(found)
 
 
 def _of_one_run(path: Path) -> list[Alarm]:

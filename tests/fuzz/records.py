@@ -73,10 +73,17 @@ def _must_be_true(claim: Alarm, right: tuple[Alarm, ...]) -> None:
     if not true:
         raise WrongError(f"proven: {claim.observer} at sample {claim.sample}, which never fell there")
     mine, its = claim.certificate.samples, true[0].certificate.samples
+    own, right_one = claim.certificate, true[0].certificate
+    if not (np.array_equal(own.delta, right_one.delta) and np.array_equal(own.w_rows, right_one.w_rows)):  # type: ignore[attr-defined]
+        raise WrongError("proven with other bounds of the unknowns")
+    if own.sums is not None or claim.premises:  # type: ignore[attr-defined]
+        raise WrongError("proven with bounds or promises that the plant does not have")
     for s, t in zip(reversed(mine), reversed(its), strict=False):
         read = ~np.isnan(s.y)
         if not (np.array_equal(s.stack, t.stack) and np.array_equal(s.y[read], t.y[read])):
             raise WrongError("proven with another model or other data")
+        if (s.w_lower > t.w_lower).any() or (s.w_upper < t.w_upper).any():
+            raise WrongError("proven with less disturbance than the plant's")
         if (s.noise < t.noise).any() or (s.slack < 0).any():
             raise WrongError("proven with less noise than the plant's")
 

@@ -22,6 +22,7 @@ from svo.logs.log import Log, expect_log
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.memory import Memory
 from svo.observers.window.observer import WindowObserver
+from svo.observers.window.proof_steps import ProofSteps
 from svo.observers.window.window import Window
 
 
@@ -123,9 +124,12 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
     )
 
 
-def proving(observer: WindowObserver) -> WindowObserver:
-    """An observer like another, before its first sample, that has each bound proven that it keeps."""
-    return observer.proving(BoundProver)
+def proving(observer: WindowObserver, steps: ProofSteps | None = None) -> WindowObserver:
+    """An observer like another, before its first sample, that has each bound proven that it keeps.
+
+    The proofs are collected by ``steps``, if these are given.
+    """
+    return observer.proving(lambda free: BoundProver(free, steps))
 
 
 def prover_of(observer: WindowObserver) -> BoundProver:
@@ -155,6 +159,8 @@ class BoundProver:
     ----------
     free : bool
         Whether the window's readings gave its first set: that bound has been proven where it was found.
+    steps : ProofSteps, optional
+        Told of every proof.
 
     Attributes
     ----------
@@ -164,15 +170,17 @@ class BoundProver:
         Those whose multipliers do not prove them.
     """
 
-    def __init__(self, free: bool) -> None:
-        self.checked, self.unproven = int(free), list[str]()
+    def __init__(self, free: bool, steps: ProofSteps | None = None) -> None:
+        self.checked, self.unproven, self._steps = int(free), list[str](), steps
 
     def arrival(self, window: Window, program: int) -> None:
         """The bound of the next arrival set that a program has just given."""
         arrays, i, lower = window.memory.arrays, program // 2, program % 2 == 1
         target = window.memory.base + window.memory.size.block
         bound = rational(-arrays["new_lower"][i] if lower else arrays["new_upper"][i])
-        proven = _proven(window, program, target, -arrays["T"][i] if lower else arrays["T"][i])
+        proof, proven = _proven(window, program, target, -arrays["T"][i] if lower else arrays["T"][i])
+        if self._steps is not None:
+            self._steps.arrival(window, program, target + window.origin, proof)
         what = f"arrival bound {program} of sample {target + window.origin}"
         self._count(proven is not None and proven <= bound, what)
 
@@ -186,8 +194,14 @@ class BoundProver:
             _known_part(memory, f),
         )
         bases = [4 * size.nt + 2 * q + side, None] if is_open else [None]
-        proofs = [_proven(window, basis, time, f[: size.n]) for basis in bases]
-        holds = any(proof is not None and proof + known <= bound for proof in proofs)
+        holds = False
+        for basis in bases:
+            proof, proven = _proven(window, basis, time, f[: size.n])
+            if proven is not None and proven + known <= bound:
+                holds = True
+                if self._steps is not None:
+                    self._steps.channel(window, q, side, float(arrays["s_lower" if side else "s_upper"][v, q]), proof)
+                break
         what = f"{'lower' if side else 'upper'} bound of s of channel {q} at sample {time + window.origin}"
         self._count(holds, what)
 
@@ -208,7 +222,7 @@ def _known_part(memory: Memory, f: Array) -> fmpq:
     return total
 
 
-def _proven(window: Window, basis: int | None, sample: int, direction: Array) -> fmpq | None:
+def _proven(window: Window, basis: int | None, sample: int, direction: Array) -> tuple[WindowCertificate, fmpq | None]:
     """The bound of a direction (in normal form) at a sample that multipliers prove about the model as it is given.
 
     They are those of the program solved last, whose basis is given; None: without any. The sample is one of the
@@ -220,4 +234,4 @@ def _proven(window: Window, basis: int | None, sample: int, direction: Array) ->
         k = int(arrays["k"][basis])
         arrays["farkas"][arrays["rows"][basis, :k]] = arrays["multiplier"][:k]
     found = window.certificate((sample, direction))
-    return found.proven_bound(sample + window.origin, direction / window.settings.form.x)
+    return found, found.proven_bound(sample + window.origin, direction / window.settings.form.x)

@@ -185,6 +185,11 @@ class WindowObserver(Observer):
         physical = self.model.physical_range
         return values if physical is None else np.minimum(values, physical.support(directions))
 
+    @property
+    def current_window(self) -> Window:
+        """The window as it stands."""
+        return self._window
+
     def proving(self, prover: Callable[[bool], Prover]) -> WindowObserver:
         """An observer with these settings and first set, before its first sample, whose bounds a prover is shown.
 

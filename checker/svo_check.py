@@ -1,0 +1,499 @@
+#!/usr/bin/env python3
+"""Check a proof that no run of a plant's model gives a log: `docs/proof_format.md`, with the standard library alone.
+
+    python svo_check.py proof.jsonl.gz --model plant.json --log log.csv
+
+Numbers are dyadic, integers times a power of two, so that nothing is rounded; only what the factors of a channel leave
+out of its matrix is bounded in floats, rounded outward. It solves nothing: the proof has the multipliers, and the first
+step that does not follow ends the check. Exit code 0: every chain is proven.
+"""
+
+import argparse
+import csv
+import hashlib
+import json
+import math
+import re
+import sys
+import time
+import zlib
+from pathlib import Path
+
+WORD = re.compile(r"-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf")
+CHUNK, MOST_UNPACKED, MOST_TIMES = 1 << 14, 64 << 20, 50  # bytes; times the size of the file
+MOST_WORK = 1.5e9  # products of bits in one step
+SIDES = {"upper": 1, "lower": -1}
+TOLERANCE = 0.0100000001  # of the sampling time, by which the times of a log may differ from it
+
+
+class Wrong(Exception):
+    pass
+
+
+def expect(holds, why):
+    if not holds:
+        raise Wrong(why)
+
+
+class Vec:
+    """Integers times 2^e; a number is a vector of one, and multiplies vectors."""
+
+    __slots__ = ("e", "m")
+
+    def __init__(self, m, e=0):
+        self.m, self.e = m, e
+
+    @classmethod
+    def of(cls, values):
+        expect(all(map(math.isfinite, values)), "a number is not finite")
+        pairs = [(top, 1 - bottom.bit_length()) for top, bottom in (v.as_integer_ratio() for v in values)]
+        e = min((p for m, p in pairs if m), default=0)
+        return cls([m << (p - e) if m else 0 for m, p in pairs], e)
+
+    def __add__(self, other):
+        e = min(self.e, other.e)
+        a, b = self.e - e, other.e - e
+        return Vec([(x << a) + (y << b) for x, y in zip(self.m, other.m, strict=True)], e)
+
+    def __neg__(self):
+        return Vec([-x for x in self.m], self.e)
+
+    def __sub__(self, other):
+        return self + -other
+
+    def __mul__(self, other):
+        return Vec([self.m[0] * x for x in other.m], self.e + other.e)
+
+    def __lt__(self, other):
+        return (self - other).m[0] < 0
+
+    def __bool__(self):
+        return any(self.m)
+
+    def __getitem__(self, part):
+        return Vec(self.m[part], self.e)
+
+    def dot(self, other):
+        return Vec([sum(x * y for x, y in zip(self.m, other.m, strict=True) if x)], self.e + other.e)
+
+    def then(self, other):
+        e = min(self.e, other.e)
+        return Vec([x << (self.e - e) for x in self.m] + [x << (other.e - e) for x in other.m], e)
+
+
+def num(value):
+    return Vec.of([value])
+
+
+def up(value):
+    expect(not math.isnan(value), "a bound is not a number")
+    return math.nextafter(value, math.inf)
+
+
+def down(value):
+    return -up(-value)
+
+
+def real(text):
+    expect(isinstance(text, str) and WORD.fullmatch(text), f"expected a float in hexadecimal, found {str(text)[:40]!r}")
+    return float.fromhex(text)
+
+
+def array(record, *shape):
+    """A nested list of floats; a None in the shape is any length."""
+    expect(isinstance(record, dict) and set(record) == {"shape", "hex"}, "expected an array")
+    found, words = record["shape"], record["hex"]
+    expect(isinstance(found, list) and isinstance(words, str) and len(found) == len(shape), "expected an array")
+    fits = (type(n) is int and n >= 0 and want in (None, n) for n, want in zip(found, shape, strict=True))
+    expect(all(fits), f"an array has shape {str(found)[:80]}; expected {list(shape)}")
+    values = [real(word) for word in words.split(" ")] if words else []
+    expect(math.prod(found) == len(values) and found[0] <= max(len(values), 1 << 16), "an array has other entries")
+    for n in reversed(found[1:]):
+        values = [values[i : i + n] for i in range(0, len(values), n)] if n else [[] for _ in range(found[0])]
+    return values
+
+
+def count(value, least=0, end=2**53):
+    expect(type(value) is int and least <= value < end, f"expected an integer from {least} to below {end}")
+    return value
+
+
+def lines_of(path):
+    """The lines of a file, packed or not, that are not blank."""
+    with open(path, "rb") as file:
+        waiting, parts, total = file.read(CHUNK), [], 0
+        is_packed, most = waiting[:2] == b"\x1f\x8b", max(MOST_UNPACKED, MOST_TIMES * Path(path).stat().st_size)
+        while waiting:
+            member, made = zlib.decompressobj(31), 0
+            while is_packed and waiting and not member.eof:
+                parts.append(member.decompress(waiting, 1 << 20))
+                made += len(parts[-1])
+                expect(total + made <= most, f"it unpacks to more than {most >> 20} MB")
+                waiting = (member.unused_data if member.eof else member.unconsumed_tail) or file.read(CHUNK)
+            expect(not is_packed or (member.eof and made), "a gzip member is cut or empty")
+            total += made
+            if not is_packed:
+                parts.append(waiting)
+                waiting = file.read(CHUNK)
+    return (line for line in b"".join(parts).split(b"\n") if line.strip())
+
+
+class Log:
+    def __init__(self, path, columns):
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines(keepends=True)
+        if lines and not lines[-1].endswith(("\n", "\r")):
+            lines.pop()  # a line without its end is no sample
+        header, *rows = [row for row in csv.reader(lines) if row]
+        groups = [[columns["time"]], columns["inputs"], columns["outputs"]]
+        expect(all(header.count(name) == 1 for group in groups for name in group), "the log lacks columns of the model")
+        table = [[[float(row[header.index(c)].strip() or "nan") for c in group] for group in groups] for row in rows]
+        self.time, self.u, self.y = [t for (t,), _, _ in table], [u for _, u, _ in table], [y for _, _, y in table]
+
+    def check_times(self, Ts, last):
+        for k in range(last):
+            dt = self.time[k + 1] - self.time[k]
+            expect(abs(dt - Ts) <= TOLERANCE * Ts, f"samples {k} and {k + 1} are {dt:g} s apart, not {Ts:g}")
+
+
+class Set:
+    """{x : box[0] <= x <= box[1], ends[0] <= rows x <= ends[1]}."""
+
+    def __init__(self, box, rows=(), ends=((), ())):
+        self.box, self.rows, self.ends = box, rows, ends
+
+    @classmethod
+    def read(cls, record, n):
+        rows = array(record["rows"], None, n)
+        ends = [array(record[end], len(rows)) for end in ("lower", "upper")]
+        return cls([array(record[end], n) for end in ("box_lower", "box_upper")], rows, ends)
+
+    def within(self, other):
+        if other is None:
+            return self
+        pairs = [list(zip(*both, strict=True)) for both in zip(self.box, other.box, strict=True)]
+        return Set([[max(pair) for pair in pairs[0]], [min(pair) for pair in pairs[1]]], self.rows, self.ends)
+
+
+class Model:
+    """An observer's model: the numbers of plant.json alone, never those of a proof."""
+
+    def __init__(self, record):
+        n, nu, ny, nw = (count(record[key]) for key in ("n", "inputs", "outputs", "disturbances"))
+        self.n, self.nu, self.ny, self.rows, self.columns = n, nu, ny, n + ny, n + nu + 1 + nw
+        self.delta = array(record["delta"], None, 2)
+        given = record["matrices"]
+        parts = (array(given[key], None) if key in given else None for key in ("points", "schedule"))
+        self._points, self._schedule = parts
+        self._stacks = array(given["stacks"], None, 1 + len(self.delta), self.rows, self.columns)
+        self._bounds = [array(record[b], None, size) for b, size in (("noise", ny), ("w_lower", nw), ("w_upper", nw))]
+        self.w_rows = array(record["w_rows"]["rows"], None, nw)
+        self.w_ends = [array(record["w_rows"][end], len(self.w_rows)) for end in ("lower", "upper")]
+        self.first = Set.read(record["first"], n)
+        ranges = (record["physical"], record["largest"])
+        self.physical, self.largest = (None if r is None else Set([array(end, n) for end in r]) for r in ranges)
+        self.is_scheduled = self._points is not None or len(self._stacks) > 1
+        self._known = {}
+
+    def bounds(self, k):
+        """Noise, lower and upper w of a sample."""
+        return [each[0 if len(each) == 1 else k] for each in self._bounds]
+
+    def stack(self, k):
+        """Matrices of a sample: items of rows of floats; the first one exactly; the bits that it adds to a product."""
+        k = k if self.is_scheduled else 0
+        if k not in self._known:
+            floats = self._stacks[0 if len(self._stacks) == 1 else k] if self._points is None else self._at(k)
+            flat = Vec.of([v for row in floats[0] for v in row])
+            rows = [flat.m[i : i + self.columns] for i in range(0, len(flat.m), self.columns)]
+            sizes = [math.frexp(v)[1] for row in floats[0] for v in row if v] or [0]
+            self._known[k] = floats, rows, flat.e, 53 + max(sizes) - min(sizes)
+        return self._known[k]
+
+    def _at(self, k):
+        """Linear interpolation, five operations in doubles; the nearest end beyond the points."""
+        points, s = self._points, self._schedule[k]
+        expect(math.isfinite(s), "a scheduling value is not finite")
+        if s <= points[0] or s >= points[-1]:
+            return self._stacks[0 if s <= points[0] else -1]
+        i = max(j for j in range(len(points)) if points[j] <= s)
+        step, beyond = points[i + 1] - points[i], s - points[i]
+        pairs = [zip(*items, strict=True) for items in zip(self._stacks[i], self._stacks[i + 1], strict=True)]
+        return [[[(b - a) / step * beyond + a for a, b in zip(*rows, strict=True)] for rows in item] for item in pairs]
+
+
+class Chain:
+    """What follows, step by step, about one observer's model."""
+
+    def __init__(self, model, log):
+        self.model, self.log, self.start, self.template, self.checked = model, log, None, [], 0
+        self.bounds, self.s, self.channels, self.premises = {}, {}, {}, []
+
+    def take(self, step):
+        kind = step["step"]
+        if kind == "start":
+            self._start(step)
+        elif kind == "channels":
+            self._channels(step)
+        elif kind == "s":
+            k, q, side = self._sample(step["sample"]), count(step["channel"]), SIDES[step["side"]]
+            self.s[k, q, side] = self._bounded(step, k, self.channels[k][2][q], side)
+        elif kind == "x":
+            k, row, side, n = self._sample(step["sample"]), count(step["row"]), SIDES[step["side"]], self.model.n
+            direction = [float(i == row) for i in range(n)] if row < n else self.template[row - n]
+            whole = direction + [0.0] * (self.model.columns - n)
+            self.bounds[k, row, side] = self._bounded(step, k, whole, side)
+        else:
+            expect(kind == "alarm", "no step of a known kind")
+            expect(self._total(step).m[0] > 0, "the multipliers do not prove that the window is empty")
+        self.checked += 1
+
+    def _sample(self, value):
+        return count(value, 0, len(self.log.time))
+
+    def _start(self, step):
+        """Everything before is forgotten."""
+        k, origin, model = self._sample(step["sample"]), step["from"], self.model
+        if origin == "first":
+            expect(k == 0, "the first set is that of sample 0")
+            found, premise = model.first, "the first set of the model holds the state at sample 0"
+        elif origin == "largest":
+            expect(model.largest is not None, "the model has no largest set")
+            found, premise = model.largest, f"the largest set holds the state at sample {k}, where it started again"
+        else:
+            expect(origin == "assumed", "no start of a known kind")
+            found = Set.read(step["set"], model.n)
+            box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
+            premise = f"the other models leave the state in a set that is ASSUMED at sample {k}, within {box}"
+        self.start, self.template = (k, found.within(model.physical)), array(step["template"], None, model.n)
+        self.bounds, self.s, self.channels, self.premises = {}, {}, {}, [premise]
+
+    def _set(self, k):
+        """What is proven of the state at a sample; infinite ends where nothing is."""
+        expect(self.start is not None and k >= self.start[0], "a step is about samples before its set starts")
+        if k == self.start[0]:
+            return self.start[1]
+        n, rows = self.model.n, len(self.template)
+        ends = [[self.bounds.get((k, row, side), side * math.inf) for row in range(n + rows)] for side in (-1, 1)]
+        return Set([end[:n] for end in ends], self.template, [end[n:] for end in ends]).within(self.model.physical)
+
+    def _channels(self, step):
+        """Factors of the uncertainties at a sample; bounds of the s of other factors are none of these."""
+        model, k = self.model, self._sample(step["sample"])
+        owner = [count(i, 1, 1 + len(model.delta)) for i in step["owner"]]
+        gain = array(step["gain"], len(owner), model.rows)
+        functional = array(step["functional"], len(owner), model.columns)
+        for q in range(len(self.channels.get(k, [[]])[0])):
+            for side in (-1, 1):
+                self.s.pop((k, q, side), None)
+        self.channels[k] = owner, gain, functional, self._left_out(k, owner, gain, functional)
+
+    def _left_out(self, k, owner, gain, functional):
+        """max |Delta| |stack - sum gain functional'|, entry by entry, rounded up, where it is not zero."""
+        found = {}
+        for item, ends in enumerate(self.model.delta, start=1):
+            mine = [q for q, i in enumerate(owner) if i == item]
+            for i, row in enumerate(self.model.stack(k)[0][item]):
+                for j, entry in enumerate(row):
+                    rest = num(entry)
+                    for q in mine:
+                        if gain[q][i] and functional[q][j]:
+                            rest -= num(gain[q][i]) * num(functional[q][j])
+                    if rest:
+                        found[i, j] = up(found.get((i, j), 0.0) + up(above(rest) * max(map(abs, ends))))
+        return found
+
+    def _factors(self, k):
+        """Those of a sample; without any, all of the uncertainties is left out."""
+        if k not in self.channels:
+            self.channels[k] = [], [], [], self._left_out(k, [], [], [])
+        return self.channels[k]
+
+    def _bounded(self, step, k, direction, side):
+        """The value of a bound of direction'(x, u, 1, w) at a sample, once it is proven."""
+        value = real(step["value"])
+        proven = -self._total(step, k, Vec.of([side * v for v in direction]))
+        expect(not num(side * value) < proven, f"a bound of sample {k} is not proven")
+        return value
+
+    def _total(self, step, at=None, objective=None):
+        """Least value of the multiplied rows less their bounds, and less the objective at a sample."""
+        model = self.model
+        n, nu = model.n, model.nu
+        first, last = self._sample(step["first"]), self._sample(step["last"])
+        length = last - first + 1
+        expect(length > 0 and (at is None or first <= at <= last), "a window's samples are out of order")
+        on_output, lines = array(step["on_output"], length, model.ny), self._lines(step, length)
+        on_w = array(step["on_w"], length, len(model.w_rows)) if "on_w" in step else [[]] * length
+        known, reach = self._set(first), None
+        total, costate, bits, work = num(0.0), Vec([0] * n), 0, 0.0
+        for i in range(length - 1, -1, -1):
+            k = first + i
+            _, rows, e, more = model.stack(k)
+            bits, work = bits + more, work + (bits + more) * model.rows * model.columns
+            expect(work < MOST_WORK, "a window's numbers are too long")
+            noise, low, high = model.bounds(k)
+            for m, y, v in zip(on_output[i], self.log.y[k], noise, strict=True):
+                if m:
+                    total -= num(m) * num(y) + num(abs(m)) * num(v)  # a missing reading is no finite number
+            weight = costate.then(Vec.of(on_output[i]))
+            sums = [0] * model.columns
+            for w, row in zip(weight.m, rows, strict=True):
+                if w:
+                    sums = [s + w * r for s, r in zip(sums, row, strict=True)]
+            g = Vec(sums, weight.e + e)
+            if at == k:
+                g -= objective
+            owner, gain, functional, rest = self._factors(k)
+            for q in range(len(owner)):
+                on_p = weight.dot(Vec.of(gain[q]))
+                for side, m, slope, intercept in lines.pop((i, q), ()):
+                    self._check_line(k, q, side, slope, intercept)
+                    on_p += num(side * m)
+                    g -= num(side * m) * num(slope) * Vec.of(functional[q])
+                    total -= num(side * m) * num(intercept)
+                if on_p:
+                    products = [num(d) * num(s) for d in self._ends(k, q)[0] for s in self._ends(k, q)[1]]
+                    total += on_p * (min(products) if on_p.m[0] > 0 else max(products))
+            if rest and weight:
+                reach = reach or self._reach(known, first, last)
+                for (row, column), size in rest.items():
+                    total -= Vec([abs(weight.m[row])], weight.e) * num(up(size * reach[i][column]))
+            if g[n : n + nu]:
+                total += g[n : n + nu].dot(Vec.of(self.log.u[k]))
+            total += g[n + nu : n + nu + 1]
+            g_w = g[n + nu + 1 :]
+            for h, m in enumerate(on_w[i]):
+                if m:
+                    total -= num(m) * num(model.w_ends[m > 0][h])
+                    g_w += num(m) * Vec.of(model.w_rows[h])
+            total += over_box(g_w, low, high)
+            costate = g[:n]
+        expect(not lines, "a line is of a channel that there is not")
+        for m, row, *ends in zip(array(step["on_start"], len(known.rows)), known.rows, *known.ends, strict=True):
+            if m:
+                total -= num(m) * num(ends[m > 0])
+                costate += num(m) * Vec.of(row)
+        return total + over_box(costate, *known.box)
+
+    def _lines(self, step, length):
+        """Multipliers of lines, by index in the window and channel: side (1 above), multiplier, slope, intercept."""
+        found, where = {}, step.get("on_line", [])
+        for (i, q, side), (m, *line) in zip(where, array(step["line"], len(where), 3) if where else [], strict=True):
+            expect(count(i) < length and count(side) < 2 and m >= 0.0, "a multiplier of a line is none")
+            found.setdefault((i, count(q)), []).append((1 - 2 * side, m, *line))
+        return found
+
+    def _ends(self, k, q):
+        """Bounds of Delta and of s of a channel."""
+        expect((k, q, 1) in self.s and (k, q, -1) in self.s, f"s of a channel of sample {k} has no proven bounds")
+        return self.model.delta[self.channels[k][0][q] - 1], (self.s[k, q, -1], self.s[k, q, 1])
+
+    def _check_line(self, k, q, side, slope, intercept):
+        """max Delta s is convex in s, min Delta s concave: a line bounds them if it does at both ends."""
+        delta, s = self._ends(k, q)
+        for end in s:
+            gaps = [num(slope) * num(end) + num(intercept) - num(d) * num(end) for d in delta]
+            expect(all(side * gap.m[0] >= 0 for gap in gaps), f"a line of sample {k} does not bound its channel")
+
+    def _reach(self, known, first, last):
+        """Bounds of |x|, |u|, 1, |w| at each sample of a window, in floats rounded outward."""
+        found, box = [], list(zip(*known.box, strict=True))
+        for k in range(first, last + 1):
+            _, low, high = self.model.bounds(k)
+            z = [*box, *((v, v) for v in self.log.u[k]), (1.0, 1.0), *zip(low, high, strict=True)]
+            found.append([max(abs(a), abs(b)) for a, b in z])
+            if k < last:
+                owner, gain, _, rest = self._factors(k)
+                ends = [self._ends(k, q) for q in range(len(owner))]
+                products = [[d * v for d in delta for v in s] for delta, s in ends]
+                known_p = [(down(min(each)), up(max(each))) for each in products]
+                box = []
+                for i in range(self.model.n):
+                    terms = zip([*self.model.stack(k)[0][0][i], *(g[i] for g in gain)], [*z, *known_p], strict=True)
+                    ends = [(factor * a, factor * b) for factor, (a, b) in terms if factor]
+                    ends += [(-size, size) for size in (up(v * found[-1][j]) for (r, j), v in rest.items() if r == i)]
+                    low_x = high_x = 0.0
+                    for pair in ends:
+                        low_x, high_x = down(low_x + down(min(pair))), up(high_x + up(max(pair)))
+                    box.append((low_x, high_x))
+        return found
+
+
+def over_box(g, low, high):
+    """Least of g'x over a box."""
+    total = num(0.0)
+    for i, (x, a, b) in enumerate(zip(g.m, low, high, strict=True)):
+        if x:
+            total += g[i : i + 1] * num(a if x > 0 else b)  # an end that is not there is no finite number
+    return total
+
+
+def above(number):
+    """A float that is not below |number|."""
+    top = abs(number.m[0])
+    more = max(0, top.bit_length() - 53)
+    return up(math.ldexp(float((top >> more) + (more > 0)), number.e + more))
+
+
+def check(proof, plant, log):
+    """Observer, sample and chain of every alarm of a proof."""
+    steps = (json.loads(line) for line in lines_of(proof))
+    head, chain, claim, done = next(steps, {}), None, None, []
+    expect(head.get("format") == "svo-proof-1", "the proof is not of the format svo-proof-1")
+    for key in ("plant", "noise"):
+        expect(head.get(key) == plant[key], f"the proof is of another {key} than the model")
+    for step in steps:
+        if step["step"] == "chain":
+            expect(chain is None, "a chain ends without its alarm")
+            expect(step["observer"] in plant["observers"], "a chain is of an observer that the model does not have")
+            chain, claim = Chain(Model(plant["observers"][step["observer"]]), log), step
+            expect(log.time[chain._sample(step["sample"])] == real(step["time"]), "a chain's time is not its sample's")
+            continue
+        expect(chain is not None, "a step stands in no chain")
+        chain.take(step)
+        if step["step"] == "alarm":
+            expect(step["last"] == claim["sample"], "an alarm is about another sample than its chain says")
+            done.append((claim["observer"], claim["sample"], chain))
+            chain = None
+    expect(chain is None and done, "the proof has no alarm, or a chain without one")
+    return done
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("proof")
+    parser.add_argument("--model", required=True)
+    parser.add_argument("--log", required=True)
+    given, begun = parser.parse_args(), time.process_time()
+    try:
+        plant = json.loads(Path(given.model).read_text(encoding="utf-8"))
+        expect(plant.get("format") == "svo-plant-1", "the model is not of the format svo-plant-1")
+        log = Log(given.log, plant["columns"])
+        expect(plant["samples"] in (None, len(log.time)), "the model's scheduling values are of another log")
+        found = check(given.proof, plant, log)
+        log.check_times(real(plant["Ts"]), max(sample for _, sample, _ in found))
+    except Wrong as error:
+        print(f"NOT PROVEN: {error}")
+        return 1
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RecursionError, TypeError, ValueError,
+            zlib.error) as error:  # fmt: skip
+        print(f"NOT PROVEN: not of the format ({type(error).__name__}: {str(error)[:200]!r})")
+        return 1
+    for observer, sample, chain in found:
+        print(f"PROVEN: {observer!r} is falsified at sample {sample} ({log.time[sample]:g} s); {chain.checked} steps")
+        for premise in chain.premises:
+            print(f"    given that {premise}")
+        if chain.model.physical is not None:
+            print("    given that the state never leaves the physical range of the model")
+        if chain.model.is_scheduled:
+            print("    given that the model file has the right matrices of each sample: an AXIOM")
+    model, readings = (hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16] for path in (given.model, given.log))
+    print(f"given the models and bounds of {given.model} (sha256 {model}...) and the readings of {given.log} (sha256")
+    print(f"{readings}...), where a decimal means the nearest double; that w and Delta are held from sample to sample,")
+    print("unless the model says that they vary, faults begin at samples, and samples are one sampling time apart")
+    print(f"{len(found)} of {len(found)} alarms proven, in {time.process_time() - begun:.1f} s CPU")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+"""A plant as a stranger's checker reads it (``svo describe``): the models of its observers, and what is promised.
+
+`docs/proof_format.md` is its definition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from svo.checks import Array
+from svo.isolation import Bank
+from svo.logs.log import Log
+from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
+from svo.observers.window.observer import WindowObserver
+from svo.observers.window.proof_steps import encode_set, first_set
+from svo.observers.window.setup import joint_rows
+from svo.plant import MonitoredPlant
+from svo.plant.dialects import on_log
+from svo.plant.scheduling import scheduled
+from svo.store.values import encode_value
+
+FORMAT = "svo-plant-1"
+
+
+def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> dict[str, Any]:
+    """What a proof is checked against: every model of a plant's bank, as JSON can hold it.
+
+    Parameters
+    ----------
+    plant : MonitoredPlant
+    noise : str
+        The noise set whose bounds are assumed.
+    log : Log, optional
+        Needed where a model is scheduled: its scheduling value at every sample is part of the record, an axiom.
+
+    Raises
+    ------
+    ValueError
+        If a model is scheduled and there is no log, or its transitions take other times than the sampling time; or
+        no observer's model can be written.
+    """
+    columns = plant.columns
+    names = {group: [c.name for c in getattr(columns, group)] for group in ("inputs", "outputs")}
+    bank = (plant if log is None else on_log(plant, log)).bank(noise)
+    if log is not None:
+        if log.keeps_its_times(plant.Ts):
+            raise ValueError("the log keeps its own times, and transitions of other lengths are not described yet")
+        log = scheduled(plant.scheduler(), log)
+    observers = _observers(bank, log)
+    if not observers:
+        raise ValueError(f"plant {plant.name!r} has no window observer of a linear model, and no other is written yet")
+    return {
+        "format": FORMAT,
+        "plant": plant.name,
+        "noise": noise,
+        "Ts": float(plant.Ts).hex(),
+        "columns": {"time": columns.time, **names},
+        "samples": None if log is None else len(log),
+        "observers": observers,
+    }
+
+
+def _observers(bank: Bank, log: Log | None) -> dict[str, Any]:
+    return {
+        name: _described(name, observer, observer.model, log)
+        for name, observer in bank.observers.items()
+        if isinstance(observer, WindowObserver)
+        and not isinstance(observer.model, NonlinearModel)
+        and observer.jitter is None
+    }
+
+
+def _described(name: str, observer: WindowObserver, model: UncertainModel, log: Log | None) -> dict[str, Any]:
+    if model.is_scheduled and (log is None or log.schedule is None):
+        raise ValueError(f"the model {name!r} is scheduled; give the log, whose scheduling values it is about")
+    lower, upper, noise = _bounds(model, log)
+    polytope = model.disturbance_polytope
+    rows = (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0)) if polytope is None else joint_rows(polytope)
+    delta = np.array([u.bounds for u in model.uncertainties]).reshape(-1, 2)
+    ranges = {"physical": model.physical_range, "largest": model.start_range}
+    return {
+        "n": model.n_states,
+        "inputs": model.n_inputs,
+        "outputs": model.n_outputs,
+        "disturbances": model.n_disturbances,
+        "matrices": _matrices(model, log),
+        "delta": encode_value(delta),
+        "noise": encode_value(noise),
+        "w_lower": encode_value(lower),
+        "w_upper": encode_value(upper),
+        "w_rows": {key: encode_value(value) for key, value in zip(("rows", "lower", "upper"), rows, strict=True)},
+        "first": encode_set(first_set(observer.current_window)),
+        **{key: None if r is None else [encode_value(r.lower), encode_value(r.upper)] for key, r in ranges.items()},
+    }
+
+
+def _bounds(model: UncertainModel, log: Log | None) -> tuple[Array, ...]:
+    """Of w and noise, one row for all samples or one each."""
+    if log is not None and log.schedule is not None and model.is_scheduled:
+        each = [np.asarray(bound) for bound in model.bounds_over(log.schedule)]
+        return tuple(bound[:1] if (bound == bound[:1]).all() else bound for bound in each)
+    return tuple(bound[None] for bound in model.bounds(model.schedule))
+
+
+def _matrices(model: UncertainModel, log: Log | None) -> Mapping[str, Any]:
+    """The stack; a table with the scheduling values of a log; or the stack of each of its samples."""
+    if not model.is_scheduled or log is None or log.schedule is None:
+        return {"stacks": encode_value(model.stack()[None])}
+    table = model.stack_table
+    if table is not None and log.schedule.ndim == 1:
+        parts = {"points": table.points, "stacks": table.values, "schedule": log.schedule}
+        return {key: encode_value(value) for key, value in parts.items()}
+    return {"stacks": encode_value(np.array([model.stack(log.schedule_at(k)) for k in range(len(log))]))}

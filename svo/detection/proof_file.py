@@ -1,0 +1,54 @@
+"""The proofs of the alarms of a run, from their first sets on, as one packed file: `docs/proof_format.md`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from svo.isolation import Alarm
+from svo.observers.window.proof_steps import SAMPLES
+from svo.store import write_whole
+from svo.store.packed_lines import packed
+
+FORMAT = "svo-proof-1"
+
+
+class Chain(NamedTuple):
+    """The proof of one alarm.
+
+    Attributes
+    ----------
+    alarm : Alarm
+    started : int
+        The log's sample at which the observer last started.
+    steps : list of dict
+        As `ProofSteps` has them: samples are counted from there.
+    assumed : str or None
+        What the set at that sample rests on; None: it is the first set of the model.
+    """
+
+    alarm: Alarm
+    started: int
+    steps: list[dict[str, Any]]
+    assumed: str | None
+
+
+def write_proof(path: Path, chains: Sequence[Chain]) -> None:
+    """Write the proofs of alarms of one run."""
+    source = chains[0].alarm.source
+    head = {"format": FORMAT, **{key: source[key] for key in ("plant", "noise", "architecture") if key in source}}
+    lines = [head, *(line for chain in chains for line in _lines(chain))]
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    write_whole(path, lambda file: file.write_bytes(packed(text.encode())))
+
+
+def _lines(chain: Chain) -> Iterator[dict[str, Any]]:
+    alarm = chain.alarm
+    yield {"step": "chain", "observer": alarm.observer, "sample": alarm.sample, "time": float(alarm.time).hex()}
+    for step in chain.steps:
+        moved = {key: step[key] + chain.started for key in SAMPLES if key in step}
+        if step["step"] == "start" and step["from"] == "first" and chain.assumed is not None:
+            moved |= {"from": "assumed", "because": chain.assumed}
+        yield step | moved

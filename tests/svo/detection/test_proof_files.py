@@ -1,0 +1,390 @@
+"""Proofs from the plant to the alarm, checked by a program that shares no line with this project; and forged ones."""
+
+from __future__ import annotations
+
+import ast
+import gzip
+import importlib.util
+import json
+import sys
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pytest
+from proof_cases import CHECKER, Made, answer, proven, random_plant, steps_of, tiny, with_steps
+from typer.testing import CliRunner
+
+from svo import UncertainModel, Uncertainty, find_plant
+from svo.cli import app
+from svo.detection.plant_record import plant_record
+
+CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
+Files = tuple[Path, Path, Path]
+
+
+def checker() -> Any:
+    """The checker as a module, where a process for each question would take too long."""
+    spec = importlib.util.spec_from_file_location("svo_check", CHECKER)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+CHECK = checker()
+REFUSALS = (CHECK.Wrong, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> tuple[Files, int]:
+    plant, log, healthy = tiny()
+    files = proven(plant, log, tmp_path_factory.mktemp("tiny"))
+    assert files is not None
+    return files, healthy
+
+
+def claims(files: Files) -> list[tuple[str, int, list[str]]]:
+    """What the checker takes as proven, and given what; none if it refuses."""
+    plant = json.loads(files[1].read_text())
+    try:
+        found = CHECK.check(files[0], plant, CHECK.Log(files[2], plant["columns"]))
+    except REFUSALS:
+        return []
+    return [(observer, sample, chain.premises) for observer, sample, chain in found]
+
+
+# -- what is proven ---------------------------------------------------------------------------------------------------
+
+
+def test_the_checker_is_one_short_file_of_the_standard_library() -> None:
+    text = CHECKER.read_text(encoding="utf-8")
+    assert text.count("\n") < 500
+    names = {
+        (alias.name if isinstance(node, ast.Import) else node.module or "").partition(".")[0]
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+    }
+    assert names <= sys.stdlib_module_names
+
+
+@pytest.mark.parametrize("seed", [2, 7, 9, *(pytest.param(s, marks=pytest.mark.slow) for s in range(40) if s > 9)])
+def test_the_checker_proves_what_full_proves(seed: int, tmp_path: Path) -> None:
+    """Schedules, rows on w, templates, uncertainties of any rank, ranges."""
+    files = proven(*random_plant(seed), tmp_path)
+    if files is None:
+        return
+    code, text = answer(*files)
+    assert code == 0, text
+    assert "given that the first set of the model holds the state at sample 0" in text
+    assert ("AXIOM" in text) is bool(seed % 2)
+    assert ("physical range" in text) is (seed % 5 == 0)
+
+
+def test_the_commands_write_what_the_checker_takes(tmp_path: Path) -> None:
+    log, out = CART.with_suffix(".csv"), tmp_path / "found"
+    run = lambda *words: CliRunner().invoke(app, [str(word) for word in words])  # noqa: E731
+    proof, plant = tmp_path / "proof.jsonl.gz", tmp_path / "plant.json"
+    assert run("detect", CART, log, "--out", out).exit_code == 0
+    assert run("verify", out / "alarms.jsonl", "--full", log, "--write-proof", proof).exit_code == 0
+    assert run("describe", CART, "--out", plant).exit_code == 0
+    code, text = answer(proof, plant, log)
+    assert code == 0
+    assert "2 of 2 alarms proven" in text
+    again = run("verify", out / "alarms.jsonl", "--full", log, "--write-proof", proof)
+    assert again.exit_code == 1  # it exists
+    assert run("verify", out / "alarms.jsonl", "--write-proof", tmp_path / "other.gz").exit_code == 1
+    assert "without --full" in run("verify", out / "alarms.jsonl", "--write-proof", tmp_path / "other.gz").output
+
+
+def test_a_scheduled_plant_is_described_with_its_log(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["describe", "eclipse", "--noise", "quiet", "--out", str(tmp_path / "plant.json")])
+    assert done.exit_code == 1
+    assert "scheduled" in done.output
+    assert "give the log" in done.output
+
+
+@pytest.mark.slow
+def test_the_eclipse_is_proven(tmp_path: Path) -> None:
+    plant = find_plant("eclipse")
+    for seed, fault in ((3, "elevator"), (4, "alpha"), (5, "dynamics")):
+        (tmp_path / fault).mkdir()
+        log = plant.simulate(fault, "soft", "quiet", seed)
+        files = proven(plant, log, tmp_path / fault, noise="quiet")
+        assert files is not None
+        code, text = answer(*files)
+        assert code == 0, text
+
+
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+
+def edited(change: Callable[[list[Any]], Any]) -> Callable[[Files], Files]:
+    def forge(files: Files) -> Files:
+        steps = deepcopy(steps_of(files[0]))
+        change(steps)
+        return with_steps(files[0], steps), *files[1:]
+
+    return forge
+
+
+def of_kind(steps: list[Any], kind: str) -> list[Any]:
+    return [step for step in steps if step.get("step") == kind]
+
+
+def dropped(*kinds: str) -> Callable[[list[Any]], None]:
+    return lambda steps: steps.__setitem__(slice(None), [s for s in steps if s.get("step") not in kinds])
+
+
+def shifted(by: int) -> Callable[[list[Any]], None]:
+    def change(steps: list[Any]) -> None:
+        for step in steps[2:]:
+            step |= {name: step[name] + by for name in ("sample", "first", "last") if name in step}
+
+    return change
+
+
+def tighter(kind: str) -> Callable[[list[Any]], None]:
+    def change(steps: list[Any]) -> None:
+        for step in of_kind(steps, kind):
+            step["value"] = (float.fromhex(step["value"]) - (0.5 if step["side"] == "upper" else -0.5)).hex()
+
+    return change
+
+
+def earlier(steps: list[Any]) -> None:
+    """The alarm said to be of a healthy sample."""
+    steps[1] |= {"sample": 5, "time": (2.5).hex()}
+    alarm = of_kind(steps, "alarm")[0]
+    alarm |= {"last": 5, "first": 5 - alarm["last"] + alarm["first"]}
+
+
+def with_line(side: int, *line: float) -> Callable[[list[Any]], None]:
+    """The multiplier, slope and intercept of one more line in the proof of a healthy sample."""
+
+    def change(steps: list[Any]) -> None:
+        earlier(steps)
+        alarm = of_kind(steps, "alarm")[0]
+        alarm |= {"on_line": [[0, 0, side]], "line": {"shape": [1, 3], "hex": " ".join(v.hex() for v in line)}}
+
+    return change
+
+
+FORGED: dict[str, Callable[[Files], Files]] = {
+    "another observer": edited(lambda steps: steps[1].__setitem__("observer", "sensor")),
+    "another noise set": edited(lambda steps: steps[0].__setitem__("noise", "none")),
+    "another time": edited(lambda steps: steps[1].__setitem__("time", (99.0).hex())),
+    "samples shifted": edited(shifted(1)),
+    "samples shifted back": edited(shifted(-1)),
+    "a healthy sample": edited(earlier),
+    "a healthy sample, claimed": edited(lambda steps: steps[1].update({"sample": 5, "time": (2.5).hex()})),
+    "no bounds of states": edited(dropped("x")),
+    "no bounds of channels": edited(dropped("s")),
+    "no start": edited(dropped("start")),
+    "no alarm": edited(dropped("alarm")),
+    "no steps": edited(lambda steps: steps.__setitem__(slice(1, None), [])),
+    "states within less": edited(tighter("x")),
+    "channels within less": edited(tighter("s")),
+    "the largest set": edited(lambda steps: of_kind(steps, "start")[0].__setitem__("from", "largest")),
+    "signs turned": edited(
+        lambda steps: of_kind(steps, "alarm")[0]["on_output"].__setitem__(
+            "hex", " ".join(w[1:] if w[0] == "-" else "-" + w if w != "0" else w
+                            for w in of_kind(steps, "alarm")[0]["on_output"]["hex"].split())
+        )
+    ),
+    "a line that cuts": edited(with_line(0, 1024.0, 0.0, -1024.0)),
+    "a line below that cuts": edited(with_line(1, 1024.0, 0.0, 1024.0)),
+    "a line the wrong way round": edited(with_line(0, -1024.0, 0.0, 1024.0)),
+    "a line that is infinite": edited(with_line(0, 1.0, 0.0, float("-inf"))),
+    "a step of no kind": edited(lambda steps: steps.insert(3, {"step": "trust me"})),
+    "a list": edited(lambda steps: steps.insert(3, [])),
+}  # fmt: skip
+
+
+def alarm_of(last: int, *on_output: float, first: int = 0) -> dict[str, Any]:
+    """An alarm with these multipliers of the only output."""
+    readings = {"shape": [len(on_output), 1], "hex": " ".join(m.hex() for m in on_output)}
+    return {"step": "alarm", "first": first, "last": last, "on_start": NOTHING, "on_output": readings}
+
+
+def s_within(side: str, value: float) -> dict[str, Any]:
+    nothing = {"first": 0, "last": 0, "on_start": NOTHING, "on_output": {"shape": [1, 1], "hex": "0"}}
+    return {"step": "s", "sample": 0, "channel": 0, "side": side, "value": value.hex()} | nothing
+
+
+NOTHING = {"shape": [0], "hex": ""}
+FACTORS = {
+    "step": "channels", "sample": 0, "owner": [1],
+    "gain": {"shape": [1, 2], "hex": "0x1.0p+0 0"}, "functional": {"shape": [1, 3], "hex": "0x1.0p-1 0 0"},
+}  # fmt: skip
+S_WITHIN, S_IS_ZERO = ([s_within("upper", end), s_within("lower", -end)] for end in (0.5, 0.0))
+SHORT = {
+    # x0 in [-1, 1], x1 = x0 + w + 0.5 Delta x0, |w| <= 0.1, |Delta| <= 1, y = x + v, |v| <= 0.2: readings up to 1.2 and
+    # 1.8 are healthy. Each proof would hold if the term that it is named after were left out.
+    "noise": ([1.1], 0, [alarm_of(0, -1.0)]),
+    "the box of w": ([0.9, 1.25], 0, [alarm_of(1, 0.0, -1.0)]),
+    "the range of p": ([0.9, 1.7], 1, [FACTORS, *S_WITHIN, alarm_of(1, 0.0, -1.0)]),
+    "what no factors hold": ([0.9, 1.7], 1, [alarm_of(1, 0.0, -1.0)]),
+    "where the first set is": ([0.9, 1.3], 0, [alarm_of(1, -1.0, first=1)]),
+    "the bounds of s": ([0.9, 1.7], 1, [FACTORS, *S_IS_ZERO, alarm_of(1, 0.0, -1.0)]),
+}
+
+
+@pytest.mark.parametrize("term", SHORT)
+def test_no_term_is_left_out(term: str, tmp_path: Path) -> None:
+    y, uncertain, steps = SHORT[term]
+    assert claims(by_hand(tmp_path, y, bool(uncertain), steps, start=1 if "first set" in term else 0)) == []
+    further = [value + 2.0 for value in y]  # which no term explains
+    assert claims(by_hand(tmp_path, further, bool(uncertain), steps, 0)) or "first set" in term or "bounds of s" in term
+
+
+def by_hand(folder: Path, y: list[float], uncertain: bool, steps: list[Any], start: int) -> Files:
+    """A proof of these steps, of a plant that can be reckoned with in one's head."""
+    more = {"uncertainties": [Uncertainty(A=[[0.5]])]} if uncertain else {}
+    plant = Made(UncertainModel([[1.0]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.2], Ts=1.0, **more))
+    last = steps[-1]["last"]
+    head = {"format": "svo-proof-1", "plant": "made", "noise": "stated"}
+    chain = {"step": "chain", "observer": "nominal", "sample": last, "time": float(last).hex()}
+    begin = {"step": "start", "sample": start, "from": "first", "template": {"shape": [0, 1], "hex": ""}}
+    (folder / "plant.json").write_text(json.dumps(plant_record(plant, "stated")))
+    rows = "".join(f"{float(k)},{value}\n" for k, value in enumerate(y))
+    (folder / "log.csv").write_text("time_s,y0\n" + rows)
+    proof = with_steps(folder / "proof", [head, chain, begin, *steps])
+    return proof, folder / "plant.json", folder / "log.csv"
+
+
+@pytest.mark.parametrize("what", FORGED)
+def test_a_forged_proof_is_refused(case: tuple[Files, int], what: str) -> None:
+    assert claims(case[0])
+    assert claims(FORGED[what](case[0])) == []
+
+
+def test_a_proof_of_other_readings_is_refused(case: tuple[Files, int], tmp_path: Path) -> None:
+    proof, plant, log = case[0]
+    lines = log.read_text().splitlines()
+    healthy = tmp_path / "healthy.csv"
+    cells = [line.split(",") for line in lines[1:]]
+    healthy.write_text("\n".join([lines[0], *(",".join([*row[:-1], cells[0][-1]]) for row in cells)]) + "\n")
+    assert claims((proof, plant, healthy)) == []
+    empty = tmp_path / "missing.csv"
+    empty.write_text("\n".join([lines[0], *(",".join([*row[:-1], ""]) for row in cells)]) + "\n")
+    assert claims((proof, plant, empty)) == []
+
+
+def test_a_set_that_is_assumed_is_a_premise_that_is_printed(case: tuple[Files, int]) -> None:
+    steps = deepcopy(steps_of(case[0][0]))
+    of_kind(steps, "start")[0]["from"] = "assumed"
+    ((_, _, premises),) = claims((with_steps(case[0][0], steps), *case[0][1:]))
+    assert "ASSUMED at sample 0, within -1 to 1" in premises[0]
+
+
+def mutated(steps: list[Any], rng: np.random.Generator) -> list[Any]:
+    """A few entries of some steps changed, steps lost, doubled or exchanged."""
+    steps = deepcopy(steps)
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(1, len(steps)))
+        match int(rng.integers(6)):
+            case 0:
+                del steps[at]
+            case 1:
+                steps.insert(int(rng.integers(1, len(steps))), deepcopy(steps[at]))
+            case _:
+                change_entry(steps[at], rng)
+        if len(steps) < 2:
+            break
+    return steps
+
+
+def change_entry(step: dict[str, Any], rng: np.random.Generator) -> None:
+    name = str(rng.choice(sorted(step)))
+    value = step[name]
+    if isinstance(value, dict):
+        key = str(rng.choice(sorted(value)))
+        inner = value[key]
+        if isinstance(inner, dict):
+            change_entry(value, rng)
+        elif isinstance(inner, str) and inner:
+            words = inner.split(" ")
+            words[int(rng.integers(len(words)))] = other_number(rng)
+            value[key] = " ".join(words)
+        else:
+            value[key] = [int(rng.integers(0, 4)) for _ in range(int(rng.integers(0, 3)))]
+    elif isinstance(value, int):
+        step[name] = int(rng.integers(-1, 12))
+    elif isinstance(value, str) and value.lstrip("-").startswith("0x"):
+        step[name] = other_number(rng)
+    else:
+        step[name] = rng.choice(["x", "s", "upper", "lower", "first", "largest", "nominal", "other"]).item()
+
+
+def other_number(rng: np.random.Generator) -> str:
+    return str(
+        rng.choice([float(rng.normal(0.0, 10.0 ** rng.uniform(-3, 3))).hex(), "0", "inf", "nan", "-0x1.0p+1000"])
+    )
+
+
+def forge_at_random(case: tuple[Files, int], seeds: range) -> int:
+    """How many random edits are still accepted, all of them with claims that are true."""
+    files, healthy = case
+    right, still_true = steps_of(files[0]), 0
+    for seed in seeds:
+        changed = mutated(right, np.random.default_rng(seed))
+        for observer, sample, premises in claims((with_steps(files[0], changed), *files[1:])):
+            assert observer == "nominal", seed
+            assert sample > healthy, seed  # up to there the model itself made the readings
+            assert premises, seed
+            still_true += 1
+    return still_true
+
+
+def test_random_edits_prove_nothing_that_is_not_so(case: tuple[Files, int]) -> None:
+    assert forge_at_random(case, range(300)) < 300
+
+
+@pytest.mark.slow
+def test_ten_thousand_random_edits_prove_nothing_that_is_not_so(case: tuple[Files, int]) -> None:
+    assert forge_at_random(case, range(10_000)) < 10_000
+
+
+def bombs(steps: list[Any]) -> dict[str, bytes]:
+    lines = [json.dumps(step).encode() for step in steps]
+    begin, end = b"\n".join(lines[:3]) + b"\n", b"\n" + b"\n".join(lines[3:])
+    wide = {"step": "x", "sample": 0, "row": 0, "side": "upper", "value": "0", "first": 0, "last": 9}
+    shape = {"shape": [2**31, 0], "hex": ""}
+    return {
+        "digits": begin + b'{"step": "x", "sample": ' + b"9" * 10**6 + b"}" + end,
+        "nesting": begin + b"[" * 10**6 + end,
+        "shapes": begin + json.dumps(wide | {"on_start": shape, "on_output": shape}).encode() + end,
+        "template": begin + json.dumps(steps[2] | {"template": {"shape": [2**40, 1], "hex": ""}}).encode() + end,
+        "spaces": gzip.compress(b" " * 2**20) * 1000,
+        "blank lines": gzip.compress(b"\n" * 2**20) * 500,
+        "empty members": gzip.compress(b"") * 10**5,
+        "small members": gzip.compress(b" ") * 10**5,
+        "cut": gzip.compress(begin)[:-9],
+        "nothing": b"",
+    }
+
+
+def test_bombs_end_soon_with_one_line(case: tuple[Files, int], tmp_path: Path) -> None:
+    (proof, plant, log), _ = case
+    for name, content in bombs(steps_of(proof)).items():
+        path = tmp_path / "bomb.jsonl.gz"
+        path.write_bytes(content)
+        begun = perf_counter()
+        assert claims((path, plant, log)) == [], name
+        assert perf_counter() - begun < 3.0, name  # one, on a machine that is not busy
+
+
+def test_what_cannot_be_written_is_refused_with_its_reason(tmp_path: Path) -> None:
+    folder = CART.parent
+    log = folder / "two_tanks.csv"
+    if not log.exists():
+        pytest.skip("there is no example of a nonlinear plant")
+    done = CliRunner().invoke(app, ["describe", str(folder / "two_tanks.toml"), "--out", str(tmp_path / "plant.json")])
+    assert done.exit_code == 1
+    assert "no window observer of a linear model" in done.output

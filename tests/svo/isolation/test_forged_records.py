@@ -1,0 +1,135 @@
+"""Records that a forger gave a right digest: what the plant's own numbers and the log do not say is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from stored_alarms import with_digest
+
+from svo import detect, find_plant, read_log
+from svo.detection.chains import PlantModels
+from svo.isolation.alarms import alarm_line, verify_alarms
+from tests.fuzz import records
+
+CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
+Record = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def cart() -> tuple[Any, Any, list[str]]:
+    plant = find_plant(str(CART))
+    log = read_log(CART.with_suffix(".csv"), plant)
+    return plant, log, [alarm_line(alarm) for alarm in detect(plant, log, noise="stated").alarms]
+
+
+def numbers(*values: float) -> dict[str, Any]:
+    return {"shape": [len(values)], "hex": " ".join("0" if v == 0 else float(v).hex() for v in values)}
+
+
+def of_all(name: str, value: Any) -> Callable[[Record], None]:
+    """An entry that is the same at every sample, replaced."""
+    return lambda record: record["certificate"]["every_sample"].__setitem__(name, value)
+
+
+def without_outputs(record: Record) -> None:
+    """C = 0: no state explains a reading that is not zero."""
+    stacks = record["matrices"]["stacks"]
+    items, rows, columns = stacks["shape"][1:]
+    words = stacks["hex"].split()
+    for item in range(items):
+        for column in range(columns):
+            words[(item * rows + rows - 1) * columns + column] = "0"
+    stacks["hex"] = " ".join(words)
+
+
+def shifted(by: int) -> Callable[[Record], None]:
+    def change(record: Record) -> None:
+        record["sample"] += by
+        record["time"] = float(0.1 * record["sample"]).hex()
+        for name in ("first", "last"):
+            record["certificate"][name] += by
+
+    return change
+
+
+def a_sum(record: Record) -> None:
+    """A bound of a sum that the plant's noise does not have."""
+    c = record["certificate"]
+    lists = {"column": [0], "first": [c["first"]], "last": [c["last"]]}
+    c["sums"] = lists | {"lower": numbers(-1e-6), "upper": numbers(1e-6), "on_sum": numbers(1e-3)}
+
+
+def a_row(record: Record) -> None:
+    c = record["certificate"]
+    c["w_rows"], c["w_rows_lower"], c["w_rows_upper"] = (
+        {"shape": [1, 1], "hex": "0x1.0p+0"},
+        numbers(-1e-9),
+        numbers(1e-9),
+    )
+    for s in c["samples"]:
+        s["on_w"] = numbers(0.0)
+
+
+FORGED: dict[str, Callable[[Record], Any]] = {
+    "no noise": of_all("noise", numbers(0.0)),
+    "no disturbance": lambda r: (of_all("w_lower", numbers(0.0))(r), of_all("w_upper", numbers(0.0))(r)),
+    "C = 0": without_outputs,
+    "no uncertainty": lambda r: r["certificate"]["delta"].__setitem__(
+        "hex", " ".join("0" for _ in r["certificate"]["delta"]["hex"].split())
+    ),
+    "another fault": lambda r: r.__setitem__("observer", "sensor"),
+    "no such observer": lambda r: r.__setitem__("observer", "nobody"),
+    "a later sample": shifted(1),
+    "an earlier sample": shifted(-1),
+    "a bound of a sum": a_sum,
+    "a row on w": a_row,
+    "a range": lambda r: r.__setitem__("premises", {"physical": [numbers(-0.1, -0.1), numbers(0.1, 0.1)]}),
+    "another digest": lambda r: r.__setitem__("model", "0" * 64),
+    "times of their own": lambda r: r.__setitem__("dt", numbers(*[0.05] * (len(r["certificate"]["samples"]) - 1))),
+}
+
+
+@pytest.mark.parametrize("what", FORGED)
+def test_a_forged_record_is_refused_once_the_plant_is_at_hand(
+    tmp_path: Path, cart: tuple[Any, Any, list[str]], what: str
+) -> None:
+    plant, log, lines = cart
+    path = tmp_path / "alarms.jsonl"
+    for line in lines:
+        record = json.loads(line)
+        FORGED[what](record)
+        path.write_text(with_digest(record))
+        (check,) = verify_alarms(path, log, PlantModels(plant, log).difference)
+        assert not check.ok, check.reason
+
+
+def test_the_record_of_one_model_is_no_alarm_of_another(tmp_path: Path, cart: tuple[Any, Any, list[str]]) -> None:
+    plant, log, lines = cart
+    path, names = tmp_path / "alarms.jsonl", ("nominal", "motor", "sensor")
+    for line in lines:
+        record = json.loads(line)
+        for name in set(names) - {record["observer"]}:
+            path.write_text(with_digest(record | {"observer": name}))
+            (check,) = verify_alarms(path, log, PlantModels(plant, log).difference)
+            assert not check.ok, (record["observer"], name)
+
+
+def edit(seeds: range, tmp_path: Path) -> None:
+    for seed in seeds:
+        with suppress(ValueError):  # no file of alarms any more; WrongError is for what is proven and not so
+            records.alarms(np.random.default_rng(seed), tmp_path)
+
+
+def test_random_edits_of_records_prove_nothing_that_is_not_so(tmp_path: Path) -> None:
+    edit(range(400), tmp_path)
+
+
+@pytest.mark.slow
+def test_ten_thousand_random_edits_of_records_prove_nothing_that_is_not_so(tmp_path: Path) -> None:
+    edit(range(10_000), tmp_path)
