@@ -11,7 +11,7 @@ import svo as face
 from svo.cli.destinations import check_new
 from svo.cli.frame import app, chosen_noise, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, Models, NoiseName, Overwrite
-from svo.cli.output import print_checks, print_json
+from svo.cli.output import print_checks, print_json, say
 
 _WHY_EMPTY = "no model was falsified in what wrote it, or the file was cut off"
 
@@ -34,7 +34,6 @@ def verify(
         Path | None,
         typer.Option(metavar="PROOF.jsonl.gz", help="With --full: write every step of the proofs, for any checker."),
     ] = None,
-    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Check every stored alarm: its digest, its proof in exact arithmetic, and its data if the log is given.
@@ -55,7 +54,8 @@ def verify(
     if write_proof is not None:
         if full is None:
             raise ValueError("--write-proof was given without --full LOG, which makes the proof")
-        check_new(write_proof, overwrite)
+        if write_proof.exists() or write_proof.is_symlink():
+            raise ValueError(f"{write_proof} exists already, and a proof never replaces a file; give another name")
     with busy("Proving"):
         found = face.verify(alarms, log or full, full=full is not None, write_proof=write_proof)
     if not found.checks:
@@ -82,6 +82,7 @@ def describe(
     architecture: Architecture = None,
     models: Models = None,
     overwrite: Overwrite = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write the models of a plant's observers, with their bounds and promises, for a checker that is not of ours.
 
@@ -100,4 +101,9 @@ def describe(
     check_new(out, overwrite)
     found = with_bank(face.find_plant(plant), BankChoice(architecture, models))
     data = None if log is None else face.read_log(log, found)
-    write_text(out, json_text(plant_record(found, chosen_noise(found, noise), data)) + "\n")
+    record = plant_record(found, chosen_noise(found, noise), data)
+    write_text(out, json_text(record) + "\n")
+    if as_json:
+        print_json({"file": str(out), "noise": record["noise"], "observers": list(record["observers"])})
+    else:
+        say(f"Models of {', '.join(record['observers'])} with their bounds: {out}")
