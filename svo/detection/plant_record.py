@@ -47,7 +47,7 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
     names = {group: [c.name for c in getattr(columns, group)] for group in ("inputs", "outputs")}
     bank = (plant if log is None else on_log(plant, log)).bank(noise)
     if log is not None:
-        if log.keeps_its_times(plant.Ts):
+        if log.keeps_its_times:
             raise ValueError("the log keeps its own times, and transitions of other lengths are not described yet")
         log = scheduled(plant.scheduler(), log)
     observers = _observers(bank, log)
