@@ -59,7 +59,7 @@ def repeated(task: Callable[[], object], units: int = 1) -> Turn:
 
 def flight(models: list[str], horizon: int, every_sample: bool = False) -> Turn:
     """Observers of the Eclipse over a healthy flight, sample by sample; the first samples do not count."""
-    plant = eclipse()
+    plant = eclipse().with_models("lpv")
     log = plant.simulate("none", "none", "quiet", SEED)
     bank, schedule = plant.bank("quiet"), list(map(plant.scheduler(), log.y))
     start = HPolytope.box(INITIAL_LOWER, INITIAL_UPPER)
@@ -85,7 +85,7 @@ def flight(models: list[str], horizon: int, every_sample: bool = False) -> Turn:
 
 def whole_log() -> Turn:
     """The Eclipse's bank over a whole log."""
-    plant: Any = eclipse()
+    plant: Any = eclipse().with_models("lpv")
     log = plant.simulate("none", "none", "quiet", SEED)
     log = replace(log, schedule=np.array(list(map(plant.scheduler(), log.y))))
 
@@ -100,7 +100,7 @@ def whole_log() -> Turn:
 
 def tasks() -> Iterator[tuple[str, Callable[[], Turn]]]:
     """Every task by its name, with what prepares it."""
-    four = list(eclipse().bank("quiet").observers)
+    four = list(eclipse().with_models("lpv").bank("quiet").observers)
     for name in four:
         yield f"window step, {name}, N = 10", lambda name=name: flight([name], 10)  # type: ignore[misc]
     yield "window step, nominal, N = 10, every sample", lambda: flight(["nominal"], 10, every_sample=True)

@@ -109,7 +109,7 @@ def tabulate_growth(growth: Mapping[str, Mapping[int, Times]]) -> Table:
 
 def report_first_steps() -> None:
     """In a process of its own: times of the first calls after `warm_up`, as JSON on standard output."""
-    plant = Eclipse()
+    plant = Eclipse(model_kind="lpv")
     log, faulty = (plant.simulate(f, p, NOISE, SEED) for f, p in (("none", "none"), ("alpha", "step")))
     bank, second = plant.bank(NOISE), plant.bank(NOISE)
     begun = perf_counter()

@@ -29,7 +29,7 @@ def main(given: list[str] | None = None) -> None:
     parser = arguments("deadlines", __doc__, out=False)
     parser.add_argument("--flights", type=int, default=1)
     options = parser.parse_args([] if given is None else given)
-    plant, rows = Eclipse(), []
+    plant, rows = Eclipse(model_kind="lpv"), []
     plant.bank(NOISE).warm_up()
     for N in HORIZONS:
         seconds: dict[float | None, list[float]] = {deadline: [] for deadline in DEADLINES}

@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from svo.plant import HEALTHY, Plant, first_faulty_sample, load_plant
+from svo.plant import HEALTHY, Plant, first_faulty_sample, load_plant, with_bank
 from svo.studies.configuration import Job, StudyConfiguration
 
 PLANT = "eclipse"
@@ -61,7 +61,7 @@ class Outcome:
 
 def examine(job: Job) -> Outcome:
     """Simulate one run and drive a fresh bank over it."""
-    plant = _plant()
+    plant = with_bank(_plant(), job.bank)
     log = plant.simulate(job.fault, job.profile, job.noise, job.seed)
     record = plant.bank(job.noise).run(log)
     healthy_until = first_faulty_sample(plant, job.fault, job.profile, log.time)
@@ -88,9 +88,9 @@ def _plant() -> Plant:
     return load_plant(PLANT)
 
 
-def jobs(plant: Plant, runs: int, faulty_runs: int) -> list[Job]:
+def jobs(plant: Plant, runs: int, faulty_runs: int, models: str) -> list[Job]:
     """Fault-free runs, then runs of every fault and profile, each with every noise set."""
-    configure = partial(StudyConfiguration.for_plant, plant, seed=SEED, noise=plant.noise_sets)
+    configure = partial(StudyConfiguration.for_plant, plant, seed=SEED, noise=plant.noise_sets, models=(models,))
     free = configure(runs=runs, faults=(HEALTHY,)).jobs(plant)
     if faulty_runs == 0:
         return free
@@ -128,6 +128,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fault_free", description=__doc__.split("\n")[0])
     parser.add_argument("--runs", type=int, default=20, help="fault-free runs of 10 s with each noise set")
     parser.add_argument("--faulty-runs", type=int, default=2, help="runs of each fault and profile, each noise set")
+    parser.add_argument("--models", choices=("lpv", "nonlinear"), default="lpv", help="of the bank's observers")
     parser.add_argument("--processes", type=int, default=2)
     return parser.parse_args(arguments)
 
@@ -144,7 +145,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = _parse([] if arguments is None else arguments)
     plant = _plant()
     _compile(plant)
-    todo = jobs(plant, options.runs, options.faulty_runs)
+    todo = jobs(plant, options.runs, options.faulty_runs, options.models)
     begun = perf_counter()
     console = Console(width=150)
     with ProcessPoolExecutor(options.processes, mp_context=multiprocessing.get_context("spawn")) as pool:

@@ -47,7 +47,7 @@ class Outcome:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Design, fly, print and draw."""
     options = _parser().parse_args([] if arguments is None else arguments)
-    plant, console = Eclipse(), Console(width=130)
+    plant, console = Eclipse(model_kind="lpv"), Console(width=130)
     found = plant_input(plant, options.noise, FAULT, options.horizon, hold=options.hold, size=options.size)
     print(found.to_text(), flush=True)
     if found.design.u is None:

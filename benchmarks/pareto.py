@@ -50,7 +50,7 @@ def main(given: list[str] | None = None) -> None:
     parser = arguments("pareto", __doc__)
     parser.add_argument("--flights", type=int, default=3)
     options = parser.parse_args([] if given is None else given)
-    plant = Eclipse()
+    plant = Eclipse(model_kind="lpv")
     model = plant.models(NOISE)["nominal"]
     initial = HPolytope.box(INITIAL_LOWER, INITIAL_UPPER)
     templates: dict[str, Any] = {"box": "box", "rows C A^-j": output_directions(model, 2)}

@@ -109,7 +109,7 @@ class Loop:
 
 def main() -> None:
     """Measure and print."""
-    plant: Any = Eclipse()
+    plant: Any = Eclipse(model_kind="lpv")
     log = plant.simulate("none", "none", NOISE, SEED)
     schedule, models = list(map(plant.scheduler(), log.y)), plant.models(NOISE)
     table = Table(title="Programs of the window observer, CPU time: a flight of the Eclipse")

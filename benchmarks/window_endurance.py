@@ -82,7 +82,7 @@ def _run(rng: np.random.Generator, samples: int) -> Iterator[tuple[np.ndarray, n
 
 def alarms(runs: int) -> Table:
     """Flights with faults: what the nominal observer's alarm costs."""
-    eclipse, first, check = Eclipse(), [], []
+    eclipse, first, check = Eclipse(model_kind="lpv"), [], []
     verdicts = undecided = proven = 0
     eclipse.bank(NOISE).warm_up()
     for fault in eclipse.faults:

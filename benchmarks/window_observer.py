@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.window_observer", description=__doc__.split("\n")[0])
     parser.add_argument("--flights", type=int, default=3, help="flights of 10 s for the absolute times")
     options = parser.parse_args([] if arguments is None else arguments)
-    console, plant = Console(width=170), Eclipse()
+    console, plant = Console(width=170), Eclipse(model_kind="lpv")
     plant.bank(NOISE).warm_up()
     logs = [plant.simulate("none", "none", NOISE, SEED + i) for i in range(max(1, options.flights))]
     model = plant.models(NOISE)["nominal"]

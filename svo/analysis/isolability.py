@@ -17,8 +17,9 @@ from svo.checks import Array, expect
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
-from svo.plant import HEALTHY, Plant, StatedFault
+from svo.plant import HEALTHY, OffersModels, Plant, StatedFault
 
 
 @runtime_checkable
@@ -122,6 +123,7 @@ class FaultFreeFlight:
         ValueError
             If the flight is too short for the horizon, or falsifies an observer.
         """
+        plant = _linear(plant, noise)
         log = plant.simulate(HEALTHY, HEALTHY, noise, seed)
         first = int(np.searchsorted(log.time, plant.fault_time - plant.Ts / 2))
         most = len(log) - first
@@ -205,6 +207,15 @@ def stated_faults(plant: Plant, noise: str, size: float) -> Mapping[str, StatedF
     if "size" not in signature(plant.stated_faults).parameters:
         raise ValueError(f"plant {plant.name!r} states its faults at one size only; leave the size out")
     return plant.stated_faults(noise, size=size)
+
+
+def _linear(plant: Plant, noise: str) -> Plant:
+    """The plant with a bank of linear models, which a fault can be compared with, where it offers one."""
+    offered = [plant.with_models(kind) for kind in plant.model_kinds] if isinstance(plant, OffersModels) else []
+    for candidate in (plant, *offered):
+        if not any(isinstance(o.model, NonlinearModel) for o in candidate.bank(noise).observers.values()):
+            return candidate
+    return plant
 
 
 def _predicted(name: str, observer: Observer, log: Log, first: int) -> HPolytope:

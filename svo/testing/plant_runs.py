@@ -13,10 +13,12 @@ from svo.checks import Array
 from svo.isolation import Bank
 from svo.logs.log import Log
 from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel, Undecided
 from svo.plant import HEALTHY, MonitoredPlant, Plant, fault_start
 from svo.testing.rules import NotApplicable
 
 SEED = 20130401
+Model = UncertainModel | NonlinearModel
 ROUNDING = 1e-9  # of the terms of an equation: a plant may integrate where its model has matrices
 
 
@@ -43,7 +45,7 @@ class PlantRuns:
     def __init__(self, plant: MonitoredPlant) -> None:
         self.monitored = plant
         self._logs: dict[Scenario, Log] = {}
-        self._models: dict[str, UncertainModel] = {}
+        self._models: dict[str, Model] = {}
 
     @property
     def plant(self) -> Plant:
@@ -73,7 +75,7 @@ class PlantRuns:
         """A fresh run of a ``scenario`` with a ``seed``."""
         return self.plant.simulate(scenario.fault, scenario.profile, scenario.noise, seed)
 
-    def model(self, noise: str) -> UncertainModel:
+    def model(self, noise: str) -> Model:
         """Of the nominal observer of the bank for a ``noise`` set."""
         if noise not in self._models:
             self._models[noise] = nominal_model(self.monitored.bank(noise))
@@ -87,7 +89,7 @@ class PlantRuns:
         start = fault_start(self.plant, scenario.fault, scenario.profile)
         return round((start - float(log.time[0])) / self.plant.Ts)
 
-    def truths(self) -> Iterator[tuple[Scenario, UncertainModel, Log]]:
+    def truths(self) -> Iterator[tuple[Scenario, Model, Log]]:
         """The healthy part of every run whose true states are those of the nominal model."""
         for scenario in (*self.healthy, *self.faulty):
             model, log = self.model(scenario.noise), cut(self.log(scenario), 0, self.first_faulty(scenario))
@@ -97,9 +99,18 @@ class PlantRuns:
                 yield scenario, model, log
 
 
-def nominal_model(bank: Bank) -> UncertainModel:
-    model: UncertainModel = bank.observers["nominal"].model
+def nominal_model(bank: Bank) -> Model:
+    model: Model = bank.observers["nominal"].model
     return model
+
+
+def is_random(model: Model) -> bool:
+    """Whether a ``model`` leaves anything to chance."""
+    if isinstance(model, NonlinearModel):
+        lower, upper, noise = *model.flow.w, model.noise
+    else:
+        lower, upper, noise = model.bounds(model.schedule)
+    return bool(noise.any() or (upper > lower).any())
 
 
 def cut(log: Log, first: int, end: int) -> Log:
@@ -132,8 +143,10 @@ class Misfit:
         return both / np.maximum(self.allowed, np.finfo(float).tiny) - 1.0
 
 
-def misfit(model: UncertainModel, log: Log, shift: int = 0) -> Misfit:
+def misfit(model: Model, log: Log, shift: int = 0) -> Misfit:
     """That of a log with true states, if ``u[k + shift]`` drove sample k."""
+    if isinstance(model, NonlinearModel):
+        return _of_equations(model, log, shift)
     stack, (lower, upper, noise) = _along(model, log)
     n, known = model.n_states, _known(log, shift, (lower + upper) / 2)
     predicted, terms = _product(stack[:, 0], known), _product(np.abs(stack[:, 0]), np.abs(known))
@@ -151,6 +164,26 @@ def misfit(model: UncertainModel, log: Log, shift: int = 0) -> Misfit:
     allowed[:, n:] += noise
     allowed += ROUNDING * (terms + np.abs(np.nan_to_num(np.hstack([following, log.y]))))
     return Misfit((following - predicted[:, :n])[:-1], (log.y - predicted[:, n:])[:-1], allowed[:-1])
+
+
+def _of_equations(model: NonlinearModel, log: Log, shift: int) -> Misfit:
+    """That of a nonlinear model, linearised at each true state; nothing is asked where it is not enclosed."""
+    assert log.x is not None
+    w, rows = model.flow.w, len(log) - 1
+    middle, half = 0.5 * (w.lower + w.upper), 0.5 * (w.upper - w.lower)
+    following = np.hstack([log.x[1:], log.y[:-1]])
+    predicted, allowed = np.zeros_like(following), np.full_like(following, np.inf)
+    for k in range(rows):
+        x, u = log.x[k], log.u[min(max(k + shift, 0), rows)]
+        try:
+            move, read = model.transition(x, x, u), model.output(x, x, u)
+        except Undecided:
+            continue
+        predicted[k] = np.hstack([move.A @ x + move.a + move.E @ middle, read.C @ x + read.c + read.F @ middle])
+        allowed[k] = np.hstack([np.abs(move.E) @ half + move.R, np.abs(read.F) @ half + read.R + model.noise])
+    left = following - predicted
+    allowed += ROUNDING * (np.abs(predicted) + np.abs(np.nan_to_num(following)))
+    return Misfit(left[:, : model.n_states], left[:, model.n_states :], allowed)
 
 
 def _along(model: UncertainModel, log: Log) -> tuple[Array, tuple[Array, Array, Array]]:

@@ -41,7 +41,7 @@ def missile_noise(distribution: Distribution, seed: int) -> Array:
     return (error - error.mean(axis=0)) / MISSILE_NOISE["bounded"].noise_bound[9:12]
 
 
-ECLIPSE, ELEVATOR, MISSILE = eclipse(), elevator(), missile()
+ECLIPSE, ELEVATOR, MISSILE = eclipse().with_models("lpv"), elevator(), missile()
 CASES: dict[str, tuple[Callable[[Distribution, int], Array], float]] = {  # noise, and its bound in rms
     "eclipse": (eclipse_noise, 1 / RMS_PER_BOUND),
     "elevator": (elevator_noise, NOISE_BOUNDS["quiet"]),

@@ -11,7 +11,7 @@ from benchmarks._window_runs import NOISE, SEED, observer_of
 
 
 def test_highs_finds_the_bounds_of_the_observer_on_the_recorded_windows() -> None:
-    plant, compared = Eclipse(), 0
+    plant, compared = Eclipse(model_kind="lpv"), 0
     log, model = plant.simulate("none", "none", NOISE, SEED), plant.models(NOISE)["nominal"]
     recording = record(observer_of(model), log)
     samples, boxes, centre, unit = recording.scaled(model)

@@ -26,7 +26,7 @@ from tests.svo.observers.random_plants import random_plant
 
 Answers = dict[str, NDArray[Any]]
 VERDICTS = ("consistent", "undecided", "falsified")
-PLANTS = (eclipse, elevator, missile)
+PLANTS = (lambda: eclipse().with_models("lpv"), elevator, missile)
 
 
 def program(seed: int) -> Answers:

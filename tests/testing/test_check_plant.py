@@ -8,6 +8,9 @@ from typing import Any
 import pytest
 
 from docs.examples.heated_tank import HeatedTank
+from polytopes import HPolytope
+from svo import ArchitectureI, WindowObserver
+from svo.isolation import Bank
 from svo.plant import load_plant
 from svo.plant.description import read_description
 from svo.testing import PLANT_RULES, ConformanceError, PlantRuns, check_plant
@@ -23,7 +26,10 @@ def test_the_registered_plants_keep_every_rule(name: str) -> None:
     assert check_plant(load_plant(name)).kept == tuple(PLANT_RULES)
 
 
-@pytest.mark.parametrize("plant", [Tank(), TankOfTwoBanks(), TankOfTwoBanks(architecture="II"), HeatedTank()])
+@pytest.mark.parametrize(
+    "plant",
+    [Tank(), TankOfTwoBanks(), TankOfTwoBanks(architecture="II"), TankOfTwoBanks(model_kind="nonlinear"), HeatedTank()],
+)
 def test_a_users_plant_keeps_every_rule(plant: Any) -> None:
     assert check_plant(plant).kept == tuple(PLANT_RULES)
 
@@ -48,6 +54,20 @@ def test_a_broken_plant_is_caught_by_its_own_rule(broken: Any) -> None:
     own, found = BROKEN_PLANTS[broken], broken_rules(PLANT_RULES, PlantRuns(broken()))
     assert found[0] == own
     assert set(found) <= {own} | FOLLOWS.get(own, set())
+
+
+@pytest.mark.parametrize(("rule", "changes"), [("stated noise", {"n": 1e-3}), ("stated disturbances", {"w": [1e-4]})])
+def test_a_nonlinear_model_with_too_narrow_a_bound_is_caught_by_its_own_rule(rule: str, changes: Any) -> None:
+    class TooNarrow(TankOfTwoBanks):
+        def bank(self, noise: str) -> Bank:
+            observers = super().bank(noise).observers
+            models = {name: observer.model.replace(**changes) for name, observer in observers.items()}
+            narrow = {name: WindowObserver(m, HPolytope.box([0.0], [3.0]), horizon=5) for name, m in models.items()}
+            return ArchitectureI(narrow.pop("nominal"), narrow)
+
+    found = broken_rules(PLANT_RULES, PlantRuns(TooNarrow(model_kind="nonlinear")))
+    assert rule in found
+    assert set(found) <= {rule, "healthy bank", "own fault"}
 
 
 def test_a_simulator_that_ends_python_is_a_breach() -> None:

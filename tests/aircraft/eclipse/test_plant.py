@@ -38,10 +38,11 @@ def test_runs_have_the_stated_length(fault, profile, seconds):
 
 
 def test_log_has_one_column_a_channel_and_the_schedule_of_the_scheduler():
-    log, columns = PLANT.simulate("elevator", "step", "quiet", 1), PLANT.columns
+    linear = PLANT.with_models("lpv")
+    log, columns = linear.simulate("elevator", "step", "quiet", 1), linear.columns
     for array, names in ((log.u, columns.inputs), (log.y, columns.outputs), (log.x, columns.states)):
         assert array.shape == (len(log), len(names))
-    scheduler = PLANT.scheduler()
+    scheduler = linear.scheduler()
     np.testing.assert_array_equal(log.schedule, [scheduler(y) for y in log.y])
     every = [columns.time, *(c.name for c in (*columns.inputs, *columns.outputs, *columns.states))]
     assert len(set(every)) == len(every)
@@ -73,10 +74,11 @@ def test_initial_set_holds_every_start_between_25_and_55():
         assert box.contains(level_trim(Surrogate(), V).x)
 
 
+@pytest.mark.parametrize("kind", PLANT.model_kinds)
 @pytest.mark.parametrize("fault", PLANT.faults)
-def test_quiet_step_is_detected_and_isolated_as_the_paper_says(fault):
-    log, bank = PLANT.simulate(fault, "step", "quiet", 11), PLANT.bank("quiet")
-    record = bank.run(log)
+def test_quiet_step_is_detected_and_isolated_as_the_paper_says(fault, kind):
+    plant = PLANT.with_models(kind)
+    record = plant.bank("quiet").run(plant.simulate(fault, "step", "quiet", 11))
     first_faulty = round(PLANT.fault_time / PLANT.Ts)
     assert record.detected_at - first_faulty == (0 if fault == "alpha" else 1)
     assert record.fault == fault
@@ -106,11 +108,12 @@ def test_deviation_reference_changes_the_dynamics_fault_only():
     for fault, same in (("elevator", True), ("dynamics", False)):
         ours, theirs = (p.simulate(fault, "step", "quiet", 0).y for p in (PLANT, deviation))
         assert (ours == theirs).all() == same
-    assert deviation.models("quiet")["dynamics"].block("a", 37.0, uncertainty=0)[3] < 0
+    assert deviation.lpv_models("quiet")["dynamics"].block("a", 37.0, uncertainty=0)[3] < 0
 
 
-def test_dynamics_fault_in_deviation_coordinates_is_explained_by_the_nominal_model():
-    deviation = eclipse("deviation")
+@pytest.mark.parametrize("kind", PLANT.model_kinds)
+def test_dynamics_fault_in_deviation_coordinates_is_explained_by_the_nominal_model(kind):
+    deviation = eclipse("deviation").with_models(kind)
     record = deviation.bank("quiet").run(deviation.simulate("dynamics", "step", "quiet", 0))
     assert record.detected_at is None
     assert record.alive.all()

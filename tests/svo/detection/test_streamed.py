@@ -100,7 +100,7 @@ def small(seed: int, **options: Any) -> tuple[Own, Log]:
 
 
 def eclipse(architecture: str, fault: str, seed: int) -> tuple[Any, Log]:
-    plant = load_plant("eclipse")
+    plant = load_plant("eclipse").with_models("lpv")  # type: ignore[attr-defined]
     log = plant.simulate(fault, "none" if fault == "none" else "step", "quiet", seed)
     y = log.y[:700].copy()
     y[560:565] = np.nan

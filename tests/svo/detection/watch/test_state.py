@@ -17,7 +17,7 @@ from svo.detection.watch.session import Session, identity_of
 from svo.detection.watch.state import resume_state, save_state
 from svo.isolation.alarms import alarm_line
 from svo.logs.file import write_log
-from svo.plant import load_plant, resume_schedule, saved_schedule, schedule_of
+from svo.plant import BankChoice, load_plant, resume_schedule, saved_schedule, schedule_of, with_bank
 from svo.plant.description import read_description
 
 CART = Path(__file__).parents[4] / "docs" / "examples" / "cart.toml"
@@ -67,9 +67,9 @@ def test_a_session_goes_on_bit_for_bit_from_any_sample(tmp_path: Path, name: str
         assert (first.samples, second.samples) == (max(0, cut - 1), 60)
 
 
-@pytest.mark.parametrize("name", ["eclipse", "missile", "elevator"])
-def test_a_schedule_goes_on_from_what_it_was(name: str) -> None:
-    plant = load_plant(name)
+@pytest.mark.parametrize(("name", "models"), [("eclipse", "lpv"), ("missile", None), ("elevator", None)])
+def test_a_schedule_goes_on_from_what_it_was(name: str, models: str | None) -> None:
+    plant = with_bank(load_plant(name), BankChoice(models=models))
     rng = np.random.default_rng(0)
     y = rng.normal(size=(20, len(plant.columns.outputs)))
     y[rng.random(y.shape) < 0.3] = np.nan

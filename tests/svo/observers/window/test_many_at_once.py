@@ -88,7 +88,7 @@ def by_steps(bank: Any, log: Log) -> BankRecord:
 
 @pytest.mark.parametrize("fault", ["none", "elevator"])
 def test_the_bank_of_the_eclipse_says_what_its_steps_say(fault: str) -> None:
-    plant = eclipse()
+    plant = eclipse().with_models("lpv")
     log = plant.simulate(fault, "none" if fault == "none" else plant.faults[fault][0], "quiet", 3)
     log = replace(log, schedule=np.array(list(map(plant.scheduler(), log.y))))
     run, steps = plant.bank("quiet").run(log), by_steps(plant.bank("quiet"), log)
