@@ -11,7 +11,8 @@ from sets import CATALOGUE, EMPTY, FACETS
 from polytopes import EmptySetError, HPolytope
 
 EVERY = pytest.mark.parametrize("name", CATALOGUE)
-PAIRS = [(p, q) for p, q in itertools.product(CATALOGUE, repeat=2) if CATALOGUE[p].dim == CATALOGUE[q].dim]
+SAME_SPACE = [(p, q) for p, q in itertools.product(CATALOGUE, repeat=2) if CATALOGUE[p].dim == CATALOGUE[q].dim]
+PAIRS = [pytest.param(*pair, marks=[pytest.mark.slow] if k % 3 else []) for k, pair in enumerate(SAME_SPACE)]
 
 
 def exact_form(normal: tuple, bound: object) -> ppl.Linear_Expression:

@@ -40,7 +40,7 @@ def test_faces_of_known_polytopes() -> None:
 
 @pytest.mark.parametrize("decimals", [False, True])
 def test_faces_keep_eulers_relation_and_edges_have_their_rank(decimals: bool) -> None:
-    for case in range(8 if decimals else 24):
+    for case in range(4 if decimals else 16):
         P = random_polytope(case, decimals)
         found = P.incidence()
         assert sum((-1) ** i * f for i, f in enumerate(found.f_vector())) == 1 - (-1) ** found.dim, case
@@ -102,7 +102,7 @@ def test_exact_volumes_in_closed_form(n: int) -> None:
 
 @pytest.mark.parametrize("decimals", [False, True])
 def test_moments_of_a_set_are_those_of_its_parts(decimals: bool) -> None:
-    for case in range(3 if decimals else 12):
+    for case in range(2 if decimals else 8):
         P = random_polytope(case, decimals)
         normal = np.random.default_rng(case).integers(-2, 3, P.dim).astype(float)
         parts = [P & HPolytope(sign * normal[None], [0.0]) for sign in (1, -1)]
@@ -212,7 +212,7 @@ def polyhedron_points(exact: ppl.C_Polyhedron) -> np.ndarray:
     return np.array([[int(g.coefficient(ppl.Variable(j))) / int(g.divisor()) for j in range(n)] for g in points])
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@pytest.mark.parametrize("n", [1, 3])
 def test_ellipsoids_in_closed_form(n: int) -> None:
     width = np.arange(1.0, n + 1.0)
     box, cross = HPolytope.box(-width, width), HPolytope.cross_polytope(n)

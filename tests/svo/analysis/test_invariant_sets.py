@@ -49,7 +49,7 @@ def test_predecessor_and_successor_in_one_dimension() -> None:
     assert successor(HPolytope.whole_space(1), still) == HPolytope.box([0.5], [0.5])
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_states_of_the_predecessor_can_be_kept_and_others_cannot(seed: int) -> None:
     rng = np.random.default_rng(seed)
     A, B, E = rng.integers(-2, 3, (2, 2)) / 2, rng.integers(-2, 3, (2, 1)) / 2, rng.integers(-2, 3, (2, 1)) / 4
