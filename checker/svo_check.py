@@ -26,8 +26,12 @@ SIDES = {"upper": 1, "lower": -1}
 TOLERANCE = 0.0100000001  # of the sampling time, by which the times of a log may differ from it
 
 
-class Wrong(Exception):
+class Wrong(ValueError):
     pass
+
+
+ERRORS = ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError
+REFUSALS = (*ERRORS, zlib.error)
 
 
 def expect(holds, why):
@@ -37,8 +41,6 @@ def expect(holds, why):
 
 class Vec:
     """Integers times 2^e; a number is a vector of one, and multiplies vectors."""
-
-    __slots__ = ("e", "m")
 
     def __init__(self, m, e=0):
         self.m, self.e = m, e
@@ -55,11 +57,8 @@ class Vec:
         a, b = self.e - e, other.e - e
         return Vec([(x << a) + (y << b) for x, y in zip(self.m, other.m, strict=True)], e)
 
-    def __neg__(self):
-        return Vec([-x for x in self.m], self.e)
-
     def __sub__(self, other):
-        return self + -other
+        return self + num(-1.0) * other
 
     def __mul__(self, other):
         return Vec([self.m[0] * x for x in other.m], self.e + other.e)
@@ -90,8 +89,8 @@ def up(value):
     return math.nextafter(value, math.inf)
 
 
-def down(value):
-    return -up(-value)
+def sum_up(terms):  # at least the sum of products, each rounded; math.fsum itself rounds once
+    return up(math.fsum(map(up, terms)))
 
 
 def real(text):
@@ -122,19 +121,17 @@ def lines_of(path):
     """The lines of a file, packed or not, that are not blank."""
     with open(path, "rb") as file:
         waiting, parts, total = file.read(CHUNK), [], 0
-        is_packed, most = waiting[:2] == b"\x1f\x8b", max(MOST_UNPACKED, MOST_TIMES * Path(path).stat().st_size)
+        most = max(MOST_UNPACKED, MOST_TIMES * Path(path).stat().st_size)
+        if waiting[:2] != b"\x1f\x8b":
+            waiting, parts = b"", [waiting, file.read()]
         while waiting:
-            member, made = zlib.decompressobj(31), 0
-            while is_packed and waiting and not member.eof:
+            member, before = zlib.decompressobj(31), total
+            while waiting and not member.eof:
                 parts.append(member.decompress(waiting, 1 << 20))
-                made += len(parts[-1])
-                expect(total + made <= most, f"it unpacks to more than {most >> 20} MB")
+                total += len(parts[-1])
+                expect(total <= most, f"it unpacks to more than {most >> 20} MB")
                 waiting = (member.unused_data if member.eof else member.unconsumed_tail) or file.read(CHUNK)
-            expect(not is_packed or (member.eof and made), "a gzip member is cut or empty")
-            total += made
-            if not is_packed:
-                parts.append(waiting)
-                waiting = file.read(CHUNK)
+            expect(member.eof and total > before, "a gzip member is cut or empty")
     return (line for line in b"".join(parts).split(b"\n") if line.strip())
 
 
@@ -182,10 +179,12 @@ class Model:
         self.n, self.nu, self.ny, self.rows, self.columns = n, nu, ny, n + ny, n + nu + 1 + nw
         self.delta = array(record["delta"], None, 2)
         given = record["matrices"]
-        parts = (array(given[key], None) if key in given else None for key in ("points", "schedule"))
-        self._points, self._schedule = parts
+        self._points, self._schedule = (array(given[p], None) if p in given else None for p in ("points", "schedule"))
         self._stacks = array(given["stacks"], None, 1 + len(self.delta), self.rows, self.columns)
         self._bounds = [array(record[b], None, size) for b, size in (("noise", ny), ("w_lower", nw), ("w_upper", nw))]
+        sums = record.get("sums", [])
+        self._remainder = array(record["remainder"], None, ny) if "remainder" in record else [[0.0] * ny]
+        self.sums = [(count(s["column"], 0, ny + nw), count(s["samples"], 1), *array(s["ends"], 2)) for s in sums]
         self.w_rows = array(record["w_rows"]["rows"], None, nw)
         self.w_ends = [array(record["w_rows"][end], len(self.w_rows)) for end in ("lower", "upper")]
         self.first = Set.read(record["first"], n)
@@ -195,8 +194,8 @@ class Model:
         self._known = {}
 
     def bounds(self, k):
-        """Noise, lower and upper w of a sample."""
-        return [each[0 if len(each) == 1 else k] for each in self._bounds]
+        """Noise, lower and upper w, and remainder of the output of a sample."""
+        return [each[0 if len(each) == 1 else k] for each in (*self._bounds, self._remainder)]
 
     def stack(self, k):
         """Matrices of a sample: items of rows of floats; the first one exactly; the bits that it adds to a product."""
@@ -230,10 +229,8 @@ class Chain:
 
     def take(self, step):
         kind = step["step"]
-        if kind == "start":
-            self._start(step)
-        elif kind == "channels":
-            self._channels(step)
+        if kind in ("start", "channels"):
+            (self._start if kind == "start" else self._channels)(step)
         elif kind == "s":
             k, q, side = self._sample(step["sample"]), count(step["channel"]), SIDES[step["side"]]
             self.s[k, q, side] = self._bounded(step, k, self.channels[k][2][q], side)
@@ -265,7 +262,10 @@ class Chain:
             box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
             premise = f"the other models leave the state in a set that is ASSUMED at sample {k}, within {box}"
         self.start, self.template = (k, found.within(model.physical)), array(step["template"], None, model.n)
+        more = {"the state never leaves the physical range of the model": model.physical is not None,
+                "the model file has the right matrices of each sample: an AXIOM": model.is_scheduled}  # fmt: skip
         self.bounds, self.s, self.channels, self.premises = {}, {}, {}, [premise]
+        self.premises += [text for text in more if more[text]]
 
     def _set(self, k):
         """What is proven of the state at a sample; infinite ends where nothing is."""
@@ -311,7 +311,7 @@ class Chain:
     def _bounded(self, step, k, direction, side):
         """The value of a bound of direction'(x, u, 1, w) at a sample, once it is proven."""
         value = real(step["value"])
-        proven = -self._total(step, k, Vec.of([side * v for v in direction]))
+        proven = num(-1.0) * self._total(step, k, Vec.of([side * v for v in direction]))
         expect(not num(side * value) < proven, f"a bound of sample {k} is not proven")
         return value
 
@@ -325,29 +325,34 @@ class Chain:
         on_output, lines = array(step["on_output"], length, model.ny), self._lines(step, length)
         on_w = array(step["on_w"], length, len(model.w_rows)) if "on_w" in step else [[]] * length
         known, reach = self._set(first), None
-        total, costate, bits, work = num(0.0), Vec([0] * n), 0, 0.0
+        costate, bits, work = Vec([0] * n), 0, 0.0
+        total, summed = self._sums(step, first, last)
         for i in range(length - 1, -1, -1):
             k = first + i
-            _, rows, e, more = model.stack(k)
-            bits, work = bits + more, work + (bits + more) * model.rows * model.columns
+            _, rows, e, size = model.stack(k)
+            bits, work = bits + size, work + (bits + size) * model.rows * model.columns
             expect(work < MOST_WORK, "a window's numbers are too long")
-            noise, low, high = model.bounds(k)
-            for m, y, v in zip(on_output[i], self.log.y[k], noise, strict=True):
-                if m:
-                    total -= num(m) * num(y) + num(abs(m)) * num(v)  # a missing reading is no finite number
-            weight = costate.then(Vec.of(on_output[i]))
+            noise, low, high, remainder = model.bounds(k)
+            for m, y, *widths in zip(on_output[i], self.log.y[k], noise, remainder, strict=True):
+                if m:  # of a reading that is missing, which is no number
+                    total -= num(m) * num(y) + num(abs(m)) * (num(widths[0]) + num(widths[1]))
+            more = summed.get(k, Vec([0] * (model.ny + model.columns)))
+            weight = costate.then(Vec.of(on_output[i]) + more[: model.ny])
             sums = [0] * model.columns
             for w, row in zip(weight.m, rows, strict=True):
                 if w:
                     sums = [s + w * r for s, r in zip(sums, row, strict=True)]
-            g = Vec(sums, weight.e + e)
+            g = Vec(sums, weight.e + e) + more[model.ny :]
             if at == k:
                 g -= objective
             owner, gain, functional, rest = self._factors(k)
             for q in range(len(owner)):
                 on_p = weight.dot(Vec.of(gain[q]))
                 for side, m, slope, intercept in lines.pop((i, q), ()):
-                    self._check_line(k, q, side, slope, intercept)
+                    # max Delta s is convex in s, and min Delta s concave: a line bounds them if it does at both ends
+                    delta, ends = self._ends(k, q)
+                    gaps = [num(slope) * num(v) + num(intercept) - num(d) * num(v) for d in delta for v in ends]
+                    expect(all(side * gap.m[0] >= 0 for gap in gaps), f"a line of sample {k} does not bound its p")
                     on_p += num(side * m)
                     g -= num(side * m) * num(slope) * Vec.of(functional[q])
                     total -= num(side * m) * num(intercept)
@@ -375,6 +380,25 @@ class Chain:
                 costate += num(m) * Vec.of(row)
         return total + over_box(costate, *known.box)
 
+    def _sums(self, step, first, last):
+        """Rows that are sums: what their bounds come to, and by sample their multipliers of outputs, then of z."""
+        total, found, model, where = num(0.0), {}, self.model, step.get("on_sum", [])
+        for (row, end), (m,) in zip(where, array(step["sum"], len(where), 1) if where else [], strict=True):
+            column, length, *ends = model.sums[count(row)]
+            expect(first + length - 1 <= count(end) <= last, "a sum is not within its window")
+            total -= num(m) * num(ends[m > 0])
+            for k in range(end + 1 - length, end + 1):
+                noise, _, _, remainder = model.bounds(k)
+                if column < model.ny and math.isnan(self.log.y[k][column]):  # at most the noise
+                    total -= num(abs(m)) * num(noise[column])
+                    continue
+                if column < model.ny:
+                    total -= num(m) * num(self.log.y[k][column]) + num(abs(m)) * num(remainder[column])
+                at = column if column < model.ny else model.n + model.nu + 1 + column  # z = (x, u, 1, w) is after ny
+                one = num(m) * Vec([int(j == at) for j in range(model.ny + model.columns)])
+                found[k] = found[k] + one if k in found else one
+        return total, found
+
     def _lines(self, step, length):
         """Multipliers of lines, by index in the window and channel: side (1 above), multiplier, slope, intercept."""
         found, where = {}, step.get("on_line", [])
@@ -383,44 +407,30 @@ class Chain:
             found.setdefault((i, count(q)), []).append((1 - 2 * side, m, *line))
         return found
 
-    def _ends(self, k, q):
-        """Bounds of Delta and of s of a channel."""
+    def _ends(self, k, q):  # of Delta, and of s
         expect((k, q, 1) in self.s and (k, q, -1) in self.s, f"s of a channel of sample {k} has no proven bounds")
         return self.model.delta[self.channels[k][0][q] - 1], (self.s[k, q, -1], self.s[k, q, 1])
 
-    def _check_line(self, k, q, side, slope, intercept):
-        """max Delta s is convex in s, min Delta s concave: a line bounds them if it does at both ends."""
-        delta, s = self._ends(k, q)
-        for end in s:
-            gaps = [num(slope) * num(end) + num(intercept) - num(d) * num(end) for d in delta]
-            expect(all(side * gap.m[0] >= 0 for gap in gaps), f"a line of sample {k} does not bound its channel")
-
     def _reach(self, known, first, last):
-        """Bounds of |x|, |u|, 1, |w| at each sample of a window, in floats rounded outward."""
-        found, box = [], list(zip(*known.box, strict=True))
+        """Bounds of |x|, |u|, 1, |w| at each sample of a window, in floats rounded up."""
+        found, x = [], [max(map(abs, ends)) for ends in zip(*known.box, strict=True)]
         for k in range(first, last + 1):
-            _, low, high = self.model.bounds(k)
-            z = [*box, *((v, v) for v in self.log.u[k]), (1.0, 1.0), *zip(low, high, strict=True)]
-            found.append([max(abs(a), abs(b)) for a, b in z])
+            _, low, high, _ = self.model.bounds(k)
+            w = [max(map(abs, ends)) for ends in zip(low, high, strict=True)]
+            found.append([*x, *map(abs, self.log.u[k]), 1.0, *w])
             if k < last:
                 owner, gain, _, rest = self._factors(k)
                 ends = [self._ends(k, q) for q in range(len(owner))]
-                products = [[d * v for d in delta for v in s] for delta, s in ends]
-                known_p = [(down(min(each)), up(max(each))) for each in products]
-                box = []
-                for i in range(self.model.n):
-                    terms = zip([*self.model.stack(k)[0][0][i], *(g[i] for g in gain)], [*z, *known_p], strict=True)
-                    ends = [(factor * a, factor * b) for factor, (a, b) in terms if factor]
-                    ends += [(-size, size) for size in (up(v * found[-1][j]) for (r, j), v in rest.items() if r == i)]
-                    low_x = high_x = 0.0
-                    for pair in ends:
-                        low_x, high_x = down(low_x + down(min(pair))), up(high_x + up(max(pair)))
-                    box.append((low_x, high_x))
+                z = found[-1] + [up(max(abs(d * v) for d in delta for v in s)) for delta, s in ends]
+                rows = [[*self.model.stack(k)[0][0][i], *(g[i] for g in gain)] for i in range(self.model.n)]
+                x = [sum_up(abs(a) * b for a, b in zip(row, z, strict=True) if a) for row in rows]
+                for (i, j), size in rest.items():
+                    if i < len(x):
+                        x[i] = sum_up([x[i], size * found[-1][j]])
         return found
 
 
-def over_box(g, low, high):
-    """Least of g'x over a box."""
+def over_box(g, low, high):  # least of g'x
     total = num(0.0)
     for i, (x, a, b) in enumerate(zip(g.m, low, high, strict=True)):
         if x:
@@ -428,8 +438,7 @@ def over_box(g, low, high):
     return total
 
 
-def above(number):
-    """A float that is not below |number|."""
+def above(number):  # a float that is not below its size
     top = abs(number.m[0])
     more = max(0, top.bit_length() - 53)
     return up(math.ldexp(float((top >> more) + (more > 0)), number.e + more))
@@ -440,8 +449,7 @@ def check(proof, plant, log):
     steps = (json.loads(line) for line in lines_of(proof))
     head, chain, claim, done = next(steps, {}), None, None, []
     expect(head.get("format") == "svo-proof-1", "the proof is not of the format svo-proof-1")
-    for key in ("plant", "noise"):
-        expect(head.get(key) == plant[key], f"the proof is of another {key} than the model")
+    expect(all(head.get(key) == plant[key] for key in ("plant", "noise")), "the proof is of another plant or noise set")
     for step in steps:
         if step["step"] == "chain":
             expect(chain is None, "a chain ends without its alarm")
@@ -461,9 +469,8 @@ def check(proof, plant, log):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("proof")
-    parser.add_argument("--model", required=True)
-    parser.add_argument("--log", required=True)
+    for name, needed in (("proof", {}), ("--model", {"required": True}), ("--log", {"required": True})):
+        parser.add_argument(name, **needed)
     given, begun = parser.parse_args(), time.process_time()
     try:
         plant = json.loads(Path(given.model).read_text(encoding="utf-8"))
@@ -472,21 +479,14 @@ def main():
         expect(plant["samples"] in (None, len(log.time)), "the model's scheduling values are of another log")
         found = check(given.proof, plant, log)
         log.check_times(real(plant["Ts"]), max(sample for _, sample, _ in found))
-    except Wrong as error:
-        print(f"NOT PROVEN: {error}")
-        return 1
-    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RecursionError, TypeError, ValueError,
-            zlib.error) as error:  # fmt: skip
-        print(f"NOT PROVEN: not of the format ({type(error).__name__}: {str(error)[:200]!r})")
+    except REFUSALS as error:
+        why = str(error) if isinstance(error, Wrong) else f"not of the format ({type(error).__name__}: {error})"
+        print(f"NOT PROVEN: {why:.250}")
         return 1
     for observer, sample, chain in found:
         print(f"PROVEN: {observer!r} is falsified at sample {sample} ({log.time[sample]:g} s); {chain.checked} steps")
         for premise in chain.premises:
             print(f"    given that {premise}")
-        if chain.model.physical is not None:
-            print("    given that the state never leaves the physical range of the model")
-        if chain.model.is_scheduled:
-            print("    given that the model file has the right matrices of each sample: an AXIOM")
     model, readings = (hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16] for path in (given.model, given.log))
     print(f"given the models and bounds of {given.model} (sha256 {model}...) and the readings of {given.log} (sha256")
     print(f"{readings}...), where a decimal means the nearest double; that w and Delta are held from sample to sample,")

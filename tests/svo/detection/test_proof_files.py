@@ -37,7 +37,7 @@ def checker() -> Any:
 
 
 CHECK = checker()
-REFUSALS = (CHECK.Wrong, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+REFUSALS = CHECK.REFUSALS
 
 
 @pytest.fixture(scope="module")
@@ -243,19 +243,60 @@ def test_no_term_is_left_out(term: str, tmp_path: Path) -> None:
     assert claims(by_hand(tmp_path, further, bool(uncertain), steps, 0)) or "first set" in term or "bounds of s" in term
 
 
-def by_hand(folder: Path, y: list[float], uncertain: bool, steps: list[Any], start: int) -> Files:
-    """A proof of these steps, of a plant that can be reckoned with in one's head."""
+def by_hand(
+    folder: Path, y: list[float], uncertain: bool, steps: list[Any], start: int, further: dict[str, Any] | None = None
+) -> Files:
+    """A proof of these steps, of a plant that can be reckoned with in one's head and of which ``further`` is known."""
     more = {"uncertainties": [Uncertainty(A=[[0.5]])]} if uncertain else {}
     plant = Made(UncertainModel([[1.0]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.2], Ts=1.0, **more))
     last = steps[-1]["last"]
     head = {"format": "svo-proof-1", "plant": "made", "noise": "stated"}
     chain = {"step": "chain", "observer": "nominal", "sample": last, "time": float(last).hex()}
     begin = {"step": "start", "sample": start, "from": "first", "template": {"shape": [0, 1], "hex": ""}}
-    (folder / "plant.json").write_text(json.dumps(plant_record(plant, "stated")))
-    rows = "".join(f"{float(k)},{value}\n" for k, value in enumerate(y))
+    record = plant_record(plant, "stated")
+    record["observers"]["nominal"] |= further or {}
+    (folder / "plant.json").write_text(json.dumps(record))
+    rows = "".join(f"{float(k)},{'' if np.isnan(value) else value}\n" for k, value in enumerate(y))
     (folder / "log.csv").write_text("time_s,y0\n" + rows)
     proof = with_steps(folder / "proof", [head, chain, begin, *steps])
     return proof, folder / "plant.json", folder / "log.csv"
+
+
+def with_sum(column: int, samples: int, bound: float, remainder: float) -> dict[str, Any]:
+    ends = {"shape": [2], "hex": f"{(-bound).hex()} {bound.hex()}"}
+    sums = [{"column": column, "samples": samples, "ends": ends}]
+    return {"sums": sums, "remainder": {"shape": [1, 1], "hex": remainder.hex()}}
+
+
+@pytest.mark.parametrize(
+    ("y", "bound", "remainder", "holds"),
+    [
+        # x0 = x1 = x2 but for w, |x0| <= 1, |w| <= 0.1: the sum of the outputs is at most 3.3
+        ([1.1, 1.3, 1.3], 0.3, 0.0, True),  # 3.7 > 3.3 + 0.3, though each reading has its noise of 0.2
+        ([1.1, 1.3, 1.3], 0.5, 0.0, False),
+        ([1.1, 1.3, 1.3], 0.3, 0.03, True),  # 3.7 > 3.6 + 3 * 0.03
+        ([1.1, 1.3, 1.3], 0.3, 0.04, False),
+        ([1.1, np.nan, 1.45], 0.1, 0.0, True),  # 2.55 > 2.2 + 0.1 + 0.2: one is missing
+        ([1.1, np.nan, 1.45], 0.2, 0.0, False),
+    ],
+)
+def test_the_checker_takes_sums_of_readings(
+    tmp_path: Path, y: list[float], bound: float, remainder: float, holds: bool
+) -> None:
+    alarm = alarm_of(2, 0.0, 0.0, 0.0) | {"on_sum": [[0, 2]], "sum": {"shape": [1, 1], "hex": "-0x1.0p+0"}}
+    known = with_sum(0, 3, bound, remainder)
+    found = claims(by_hand(tmp_path, y, False, [alarm], 0, known))
+    assert bool(found) is holds
+    outside = alarm | {"on_sum": [[0, 1]]}
+    assert claims(by_hand(tmp_path, y, False, [outside], 0, known)) == []
+
+
+@pytest.mark.parametrize(("bound", "holds"), [(0.05, True), (0.14, True), (0.16, False)])
+def test_the_checker_takes_sums_of_disturbances(tmp_path: Path, bound: float, holds: bool) -> None:
+    # after two steps x is at most 1.2, or 1 + the bound of the sum; the reading says at least 1.15
+    alarm = alarm_of(2, 0.0, 0.0, -1.0) | {"on_sum": [[0, 1]], "sum": {"shape": [1, 1], "hex": "0x1.0p+0"}}
+    files = by_hand(tmp_path, [1.0, 1.1, 1.35], False, [alarm], 0, with_sum(1, 2, bound, 0.0))
+    assert bool(claims(files)) is holds
 
 
 @pytest.mark.parametrize("what", FORGED)
