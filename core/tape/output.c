@@ -125,21 +125,20 @@ EXPORTED integer fdi_plant_cut(const double *block, double *scratch, double *low
     return 1;
 }
 
-/* Into the rows [C, c, F, 0] of a sample's linearisation, and the noise with the remainder. */
+/* Into the rows [C, 0, c, F, 0] of a sample's linearisation, whose zeros are there; and the noise with the remainder. */
 static void give_rows(const plant *p, const output *o, double *rows, double *noise)
 {
-    const integer n = p->n, nw = p->nw;
-    for (integer i = 0; i < p->ny; i++, rows += 2 * n + 1 + nw) {
+    const integer n = p->n, nw = p->nw, at = n + p->nu;
+    for (integer i = 0; i < p->ny; i++, rows += at + 1 + nw + n) {
         copy(rows, o->C + i * n, n);
-        rows[n] = o->c[i];
-        copy(rows + n + 1, o->F + i * nw, nw);
-        fill(rows + n + 1 + nw, 0.0, n);
+        rows[at] = o->c[i];
+        copy(rows + at + 1, o->F + i * nw, nw);
         noise[i] = (p->noise[i] + o->R[i]) * (1.0 + 4.0 * ROUNDING);
     }
 }
 
 /* An output over the set that is known, which the readings y cut: low and high are given back. Again over what is left
- * while the remainder blurs the readings. The rows (ny, 2 n + 1 + nw) of a linearisation, and its noise (ny). Returns
+ * while the remainder blurs the readings. The rows (ny, n + nu + 1 + nw + n) of a linearisation, and its noise (ny). Returns
  * whether h has no form. */
 EXPORTED integer fdi_plant_measured(const double *block, double *scratch, double *low, double *high, const double *y,
                                     const double *u, double *rows, double *noise, outcome *found)

@@ -324,16 +324,15 @@ static int take(plant *p, double T, transition *t, transition *other, transition
     return 1;
 }
 
-/* Into the rows [A, a, E, diag R] of a sample's linearisation. */
+/* Into the rows [A, 0, a, E, diag R] of a sample's linearisation, whose zeros are there. */
 static void give_rows(const plant *p, const transition *t, double *rows)
 {
-    const integer n = p->n, nw = p->nw;
-    for (integer i = 0; i < n; i++, rows += 2 * n + 1 + nw) {
+    const integer n = p->n, nw = p->nw, at = n + p->nu;
+    for (integer i = 0; i < n; i++, rows += at + 1 + nw + n) {
         copy(rows, t->A + i * n, n);
-        rows[n] = t->a[i];
-        copy(rows + n + 1, t->E + i * nw, nw);
-        fill(rows + n + 1 + nw, 0.0, n);
-        rows[n + 1 + nw + i] = t->R[i];
+        rows[at] = t->a[i];
+        copy(rows + at + 1, t->E + i * nw, nw);
+        rows[at + 1 + nw + i] = t->R[i];
     }
 }
 
@@ -355,7 +354,7 @@ EXPORTED integer fdi_plant_transition(const double *block, double *scratch, cons
 }
 
 /* The same from the states that are known (n) in two ways, where these have a common one, else from the first: only the
- * window's programs raise an alarm. The state's rows of a linearisation (n, 2 n + 1 + nw), and bounds of x+ in the place
+ * window's programs raise an alarm. The state's rows of a linearisation (n, n + nu + 1 + nw + n), and bounds of x+ in the place
  * of the second. Returns 0, or the code of what came of it. */
 EXPORTED integer fdi_plant_moved(const double *block, double *scratch, const double *known_low,
                                  const double *known_high, double *low, double *high, const double *u, double T,

@@ -65,11 +65,12 @@ class Tube:
         lower, upper = first_box(initial, model)
         model.check_first(lower, upper)
         samples: list[Linearisation] = []
+        nu = model.n_inputs
         for k, held in enumerate(u):
             try:
                 beside = u[max(0, k - 1) : k + 1]
                 around = beside.min(axis=0), beside.max(axis=0)
-                now = Linearisation.before(model.output_near(lower, upper, held, around), model.noise)
+                now = Linearisation.before(model.output_near(lower, upper, held, around), model.noise, nu)
             except Undecided as error:
                 return cls._of(model, samples, f"at sample {k}, {error}")
             samples.append(now)
@@ -80,7 +81,7 @@ class Tube:
             except Undecided as error:
                 return cls._of(model, samples, f"after sample {k}, {error}")
             E = np.hstack([found.E, np.diag(found.R)])
-            samples[-1] = Linearisation.of(found.A, found.a, E, now.C, now.c, now.F, now.n)
+            samples[-1] = Linearisation.of(found.A, found.a, E, now.C, now.c, now.F, now.n, nu)
             lower, upper = found.box
         return cls._of(model, samples, None)
 

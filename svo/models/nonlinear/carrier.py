@@ -20,44 +20,47 @@ class Linearisation(NamedTuple):
 
     Attributes
     ----------
-    rows : (n + ny, n + 1 + nw + n) array
-        [[A, a, E], [C, c, F]]; the last n columns of E are the remainder of each state.
+    rows : (n + ny, n + nu + 1 + nw + n) array
+        [[A, 0, a, E], [C, 0, c, F]], as they stand in a stack; the last n columns of E are the remainder of each state.
     n : (ny,) array
+    nu : int
+        What the inputs do is in a and c, so their columns are zero.
     """
 
     rows: Array
     n: Array
+    nu: int
 
     @classmethod
-    def of(cls, A: Array, a: Array, E: Array, C: Array, c: Array, F: Array, n: Array) -> Linearisation:
+    def of(cls, A: Array, a: Array, E: Array, C: Array, c: Array, F: Array, n: Array, nu: int) -> Linearisation:
         """From its blocks: (n, n), (n,), (n, nw + n), (ny, n), (ny,), (ny, nw + n) and (ny,) arrays."""
-        return cls(np.block([[A, a[:, None], E], [C, c[:, None], F]]), n)
+        parts = zip((A, a, E), (C, c, F), strict=True)
+        first, constant, rest = (np.concatenate(pair) for pair in parts)
+        return cls(np.hstack([first, np.zeros((len(first), nu)), constant[:, None], rest]), n, nu)
 
     @classmethod
-    def empty(cls, n: int, nw: int, ny: int) -> Linearisation:
+    def empty(cls, n: int, nw: int, ny: int, nu: int) -> Linearisation:
         """Of a sample from which no transition is known, and of which nothing is measured."""
-        rows = np.zeros((n + ny, 2 * n + 1 + nw))
+        rows = np.zeros((n + ny, 2 * n + nu + 1 + nw))
         rows[:n, :n].flat[:: n + 1] = 1.0
-        return cls(rows, np.zeros(ny))
+        return cls(rows, np.zeros(ny), nu)
 
     @classmethod
-    def measured(cls, C: Array, c: Array, F: Array, n: Array) -> Linearisation:
+    def measured(cls, C: Array, c: Array, F: Array, n: Array, nu: int) -> Linearisation:
         """Of a sample of which only the measurement is known."""
         size = C.shape[1]
-        return cls.of(np.eye(size), np.zeros(size), np.zeros((size, F.shape[1])), C, c, F, n)
+        return cls.of(np.eye(size), np.zeros(size), np.zeros((size, F.shape[1])), C, c, F, n, nu)
 
     @classmethod
-    def before(cls, output: LinearOutput, noise: Array) -> Linearisation:
+    def before(cls, output: LinearOutput, noise: Array, nu: int) -> Linearisation:
         """Of a sample from which no transition is known yet."""
         F = np.hstack([output.F, np.zeros_like(output.C)])
-        return cls.measured(output.C, output.c, F, (noise + output.R) * (1.0 + 2.0**-50))
+        return cls.measured(output.C, output.c, F, (noise + output.R) * (1.0 + 2.0**-50), nu)
 
-    def stack(self, nu: int) -> Array:
-        """The rows as a stack (1, n + ny, n + nu + 1 + nw + n), with zeros for the inputs."""
-        n, (count, columns) = self._states, self.rows.shape
-        stack = np.zeros((1, count, columns + nu))
-        stack[0, :, :n], stack[0, :, n + nu :] = self.rows[:, :n], self.rows[:, n:]
-        return stack
+    @property
+    def stack(self) -> Array:
+        """The rows as a stack, (1, n + ny, n + nu + 1 + nw + n)."""
+        return self.rows[None]
 
     @property
     def _states(self) -> int:
@@ -69,11 +72,11 @@ class Linearisation(NamedTuple):
 
     @property
     def a(self) -> Array:
-        return self.rows[: self._states, self._states]
+        return self.rows[: self._states, self._states + self.nu]
 
     @property
     def E(self) -> Array:
-        return self.rows[: self._states, self._states + 1 :]
+        return self.rows[: self._states, self._states + self.nu + 1 :]
 
     @property
     def C(self) -> Array:
@@ -81,18 +84,18 @@ class Linearisation(NamedTuple):
 
     @property
     def c(self) -> Array:
-        return self.rows[self._states :, self._states]
+        return self.rows[self._states :, self._states + self.nu]
 
     @property
     def F(self) -> Array:
-        return self.rows[self._states :, self._states + 1 :]
+        return self.rows[self._states :, self._states + self.nu + 1 :]
 
 
 class _LinearisedStack(Stack):
     """A stack that a linearisation has ready."""
 
     def at(self, schedule: Any) -> Array:
-        return schedule.stack(self.layout.nu)
+        return schedule.stack
 
 
 class _LinearisedBounds(Bounds):
@@ -111,7 +114,7 @@ def carrier_of(
     """
     n, ny, columns = flow.n, len(noise), len(flow.varying) + flow.n
     state, output = (np.ones((n, n)), np.ones(n), np.ones((n, columns))), (np.ones((ny, n)), np.ones(ny))
-    typical = Linearisation.of(*state, *output, np.ones((ny, columns)), noise)
+    typical = Linearisation.of(*state, *output, np.ones((ny, columns)), noise, nu)
     unit = np.ones(n)
     found = UncertainModel(
         attrgetter("A"), np.zeros((n, nu)), attrgetter("C"), a=attrgetter("a"), E=attrgetter("E"), c=attrgetter("c"),

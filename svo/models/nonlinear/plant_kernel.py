@@ -70,7 +70,7 @@ class PlantKernel:
         self._flow, self._outputs = flow, outputs
         n, nw = flow.n, len(flow.varying)
         nu = flow.tape.variables - n - nw
-        self._sizes = n, nw, len(noise)
+        self._sizes, self._inputs = (n, nw, len(noise)), nu
         bounds = [*_ends(flow.physical, n), *_ends(flow.valid, n), largest.upper - largest.lower, *flow.w]
         head = np.array([n, nw, nu, len(noise), continuous], dtype=np.int64).view(np.float64)
         tapes = [tape.block(n + nw).content for tape in (flow.tape, reading)]
@@ -78,7 +78,7 @@ class PlantKernel:
         self._find()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in ("_flow", "_outputs", "_sizes", "_block")}
+        return {name: getattr(self, name) for name in ("_flow", "_outputs", "_sizes", "_inputs", "_block")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__ |= state
@@ -129,7 +129,7 @@ class PlantKernel:
         Undecided
             If it is not enclosed.
         """
-        found, told = Linearisation.empty(*self._sizes), np.empty(8)
+        found, told = Linearisation.empty(*self._sizes, self._inputs), np.empty(8)
         left = Span(known.lower.copy(), known.upper.copy())
         n = self._sizes[0]
         if _measured(self._address, native.scratch(self._room), *left, y, u, found.rows[n:], found.n, told):
@@ -150,7 +150,7 @@ class PlantKernel:
         rows, left, told = at.rows.copy(), Span(box.lower.copy(), box.upper.copy()), np.empty(8)
         if _moved(self._address, native.scratch(self._room), *known, *left, u, T, rows, told):
             raise self._undecided(told)
-        return Linearisation(rows, at.n), left
+        return Linearisation(rows, at.n, at.nu), left
 
     def cut(self, known: Span, y: Array, output: LinearOutput) -> Span | None:
         """What readings leave of a box for which an output holds; None where nothing is left: a program decides."""

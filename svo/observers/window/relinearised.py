@@ -85,8 +85,8 @@ class Relinearised:
                 self.now, self.box = self._near(y, u, around)
         except Undecided as error:
             self.reason = self.reason or f"{OUTSIDE_MODEL}: at sample {sample}, {error}"
-            nothing = Linearisation.empty(model.n_states, len(model.flow.varying), len(y))
-            self.now, y = Linearisation(nothing.rows, model.noise), np.full(len(y), np.nan)
+            nothing = Linearisation.empty(model.n_states, len(model.flow.varying), len(y), model.n_inputs)
+            self.now, y = nothing._replace(n=model.noise), np.full(len(y), np.nan)
         return self.now, y
 
     def _near(self, y: Array, u: Array, around: tuple[Array, Array]) -> tuple[Linearisation, Span]:
@@ -98,7 +98,7 @@ class Relinearised:
         for _ in range(2):
             output = model.output_near(*box, u, around)
             box = model.kernel.cut(box, y, output) or box
-        return Linearisation.before(output, model.noise), box
+        return Linearisation.before(output, model.noise, model.n_inputs), box
 
     # -- saved states ------------------------------------------------------------------------------------
 
@@ -117,6 +117,8 @@ class Relinearised:
         self.box, self.now, self.reason = box, None, str(state["plant.reason"]) or None
         if has_samples:
             shapes = zip(_MEASURED, ((ny, n), (ny,), (ny, columns), (ny,)), strict=True)
-            self.now = Linearisation.measured(*(numbers(state, f"plant.{name}", *shape) for name, shape in shapes))
+            parts = [numbers(state, f"plant.{name}", *shape) for name, shape in shapes]
+            C, c, F, width = parts
+            self.now = Linearisation.measured(C, c, F, width, model.n_inputs)
             if (self.now.n < model.noise).any():
                 raise ValueError("plant.n is below the noise of the model")
