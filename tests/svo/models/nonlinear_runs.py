@@ -19,12 +19,12 @@ from svo.checks import Array
 from svo.models.nonlinear import Linearisation, NonlinearModel, Span
 from svo.observers.base import Step
 from tests.svo.models.nonlinear_plants import Case
-from tests.svo.models.nonlinear_truth import Runs, called
+from tests.svo.models.nonlinear_truth import Runs, called, rounding
 
 HORIZON = 10
 SETTLED = 30  # samples after which widths count
 PART = 1e-3  # of R: the integrator's error that is allowed for
-ROUNDING = 1e-12  # of the sizes of the terms: what the truth in floats cannot tell
+ROUNDING = 1e-12  # of the sizes of the terms
 
 
 class Watched(NonlinearModel):
@@ -113,7 +113,7 @@ def examine_run(case: Case, runs: Runs, j: int, rng: np.random.Generator, dt: bo
         else:
             more = {"dt": float(one.dt[k - 1])} if dt else {}
             step = observer.step(u=one.u[k - 1], y=y, u_next=one.u[k], **more)
-            _check_moves(model, one, k - 1, found, f"run {j}, sample {k}")
+            _check_moves(model, one, k - 1, rounding(case), found, f"run {j}, sample {k}")
         _check_outputs(model, h, one, k, found, f"run {j}, sample {k}")
         ran_away = ran_away or not _is_normal(case, x)
         found.count["samples"] += 1
@@ -125,16 +125,16 @@ def examine_run(case: Case, runs: Runs, j: int, rng: np.random.Generator, dt: bo
         if step.verdict == "undecided":
             kind = "undecided in a runaway" if ran_away else "undecided in normal operation"
             found.failed(kind, f"run {j}, {step.reason}")
-        if not contains(step, x):
+        if not contains(step, x, rounding(case)):
             found.failed("excluded", f"run {j}, sample {k}")
         if k >= SETTLED and not ran_away:
             found.widths.append(step.box[1] - step.box[0])
 
 
-def contains(step: Step, x: Array) -> bool:
+def contains(step: Step, x: Array, rounding: Array) -> bool:
     """Whether a state is in the box, up to rounding."""
     lower, upper = step.box
-    room = 1e-9 * (upper - lower) + 1e-13 * np.abs(x)
+    room = 1e-9 * (upper - lower) + 1e-13 * np.abs(x) + rounding
     return bool((x >= lower - room).all() and (x <= upper + room).all())
 
 
@@ -157,7 +157,7 @@ class _Move(NamedTuple):
         return cls(found.A, found.a, found.E[:, :nw], np.diagonal(found.E[:, nw:]))
 
 
-def _check_moves(model: Watched, one: Runs, k: int, found: Findings, where: str) -> None:
+def _check_moves(model: Watched, one: Runs, k: int, lost: Array, found: Findings, where: str) -> None:
     """The true transition from sample k against those that were made of it."""
     if k + 1 >= len(one.x):
         return
@@ -166,7 +166,7 @@ def _check_moves(model: Watched, one: Runs, k: int, found: Findings, where: str)
         move = _Move.of(found_here, len(x))
         size = np.abs(move.A) @ np.abs(x) + np.abs(move.a) + np.abs(move.E) @ (np.abs(one.w[k]) * held)
         rest = np.abs(after - move.A @ x - move.a - move.E @ (one.w[k] * held))
-        room = ROUNDING * (size + np.abs(after))
+        room = ROUNDING * (size + np.abs(after)) + lost
         used = (np.maximum(rest - room, 0.0) / move.R).max()
         found.closest = max(found.closest, float(used))
         found.unresolved = max(found.unresolved, float((np.maximum(one.error[k] - room, 0.0) / move.R).max()))

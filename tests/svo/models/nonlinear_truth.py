@@ -135,7 +135,12 @@ def tolerance(case: Case) -> Array:
     if case.model.physical_range is not None:
         lower, upper, _ = case.model.physical_range.cut(lower, upper)
     R = case.model.transition(lower, upper, np.array(case.u(0), dtype=float)).R
-    return np.maximum(TOLERANCE * R, 1e-13 * (np.abs(case.x0) + 20.0 * case.spread))[:, None]
+    return np.maximum(TOLERANCE * R, 0.1 * rounding(case))[:, None]
+
+
+def rounding(case: Case) -> Array:
+    """What a truth in floats cannot tell (n,): of the size of states in operation."""
+    return np.asarray(1e-12 * (np.abs(case.x0) + 20.0 * case.spread))
 
 
 def simulated(case: Case, samples: int, rng: np.random.Generator, modes: list[str], jitter: float = 0.0) -> Runs:
