@@ -31,7 +31,7 @@ from tests.svo.observers.nonlinear_events import PLANTS, nonlinear_case
 SEED = 20_261_129
 OBSERVERS = {"window": WindowObserver, "zonotope": ConstrainedZonotopeObserver, "polytope": PolytopeObserver}
 RUN = {"polytope": 15}  # samples; 50 of the others
-SHARE = {"window": 8, "zonotope": 3, "polytope": 1}  # of the runs; nonlinear plants: 1 each
+SHARE = {"window": 8, "zonotope": 2, "polytope": 1}  # of the runs; nonlinear plants: 1 each
 TOLERANCE = 1e-3  # of a width: the integrator's error; linear: 1e-9 of the state
 KINDS = (*OBSERVERS, *PLANTS)
 

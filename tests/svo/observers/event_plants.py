@@ -149,18 +149,20 @@ class EventPlant:
         for k in range(1, len(times)):
             inputs[k] = inputs[k] if changes[k] else inputs[k - 1]
         way = self.way(times, inputs)
-        y = np.array([self._reading(way, float(t), jitter) for t in times])
+        y = np.array([self._reading(way, float(t), jitter, now) for t, now in zip(times, reads, strict=True)])
         x = np.array([s.x for s in way[::PIECES]])
         first = HPolytope.box(x[0] - self.rng.uniform(0.0, 1.0, self.n), x[0] + self.rng.uniform(0.0, 1.0, self.n))
-        log = Log(times, inputs, np.where(reads, y, np.nan), x=x)
+        log = Log(times, inputs, y, x=x)
         more = {"jitter": jitter} if jitter else {}
         return EventCase(self.model(Ts, self._reach(way), np.abs(inputs).max(axis=0), **more), log, first)
 
-    def _reading(self, way: list[Signals], stamp: float, jitter: float) -> Array:
-        """Each sensor at a time of its own."""
+    def _reading(self, way: list[Signals], stamp: float, jitter: float, now: NDArray[np.bool_]) -> Array:
+        """Each sensor that is read at a time of its own; NaN of the others."""
         off = self.draw(np.full(self.ny, -jitter), np.full(self.ny, jitter))
-        values = [self.output(way, max(stamp + dt, way[0].time))[i] for i, dt in enumerate(off.tolist())]
-        return np.array(values) + self.draw(-self.noise, self.noise)
+        noise, found = self.draw(-self.noise, self.noise), np.full(self.ny, np.nan)
+        for i in np.flatnonzero(now).tolist():
+            found[i] = self.output(way, max(stamp + float(off[i]), way[0].time))[i] + noise[i]
+        return found
 
     def _reach(self, way: list[Signals]) -> Array:
         """Bounds of |x| at the ends of all pieces and inside, with some room."""
