@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from copy import deepcopy
 from dataclasses import replace
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from polytopes import HPolytope
 from svo import (
     ArchitectureI,
+    ArchitectureII,
     ConstrainedZonotopeObserver,
     Log,
     NonlinearModel,
@@ -54,18 +56,18 @@ def exclusions(observer: Any, log: Log) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("kind", OBSERVERS)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_the_truth_is_inside_at_random_times(kind: str, seed: int) -> None:
-    case = EventPlant(np.random.default_rng([17, seed])).case(12 if kind == "polytope" else 40, Ts=0.3)
+    case = EventPlant(np.random.default_rng([17, seed])).case({"polytope": 10, "zonotope": 25}.get(kind, 40), Ts=0.3)
     assert exclusions(OBSERVERS[kind](case.model, case.first), case.log) == (0, 0)
 
 
 def test_with_the_sampling_time_instead_of_the_interval_the_truth_is_lost() -> None:
     lost = 0
-    for seed in range(6):
+    for seed in range(4):
         case = EventPlant(np.random.default_rng([17, seed])).case(40, Ts=0.3)
         lost += sum(exclusions(WindowObserver(case.model, case.first), replace(case.log, events=False))) > 0
-    assert lost >= 4
+    assert lost >= 3
 
 
 @pytest.mark.parametrize("dt", [0.0123, 0.25, 0.5, 0.75, 3.0])
@@ -132,7 +134,7 @@ def integrator_log(seed: int = 1, samples: int = 40, rate: float = 0.0) -> Log:
 
 @pytest.mark.parametrize("kind", OBSERVERS)
 def test_a_saved_state_goes_on_bit_for_bit(kind: str) -> None:
-    model, log = UncertainModel.from_continuous(**INTEGRATOR), integrator_log()
+    model, log = UncertainModel.from_continuous(**INTEGRATOR), integrator_log(samples=26)
     whole, cut = OBSERVERS[kind](model, FIRST), OBSERVERS[kind](model, FIRST)
     boxes = [np.array(step.box) for step in drive(whole, log)]
     for _, step in zip(range(20), drive(cut, log), strict=False):
@@ -188,6 +190,35 @@ def test_a_bank_isolates_at_times_of_its_own() -> None:
         verdict = stepped.step(log.u[k - 1], log.y[k], dt=float(log.time[k] - log.time[k - 1]))
     assert (verdict.fault, verdict.isolated_at) == (record.fault, record.isolated_at)
     assert bank(model).run(integrator_log()).detected_at is None
+
+
+def test_observers_that_start_during_a_run_go_on_at_times_of_their_own() -> None:
+    """Class II starts from a global observer's set when the nominal model falls, at times that are not those of Ts."""
+    model, log = UncertainModel.from_continuous(**INTEGRATOR), integrator_log(rate=0.8)
+    free, other = (model.in_given_time(lambda plant, w=w: plant.replace(w=w)) for w in ([1.0], ([-3.0], [-2.0])))
+    everything = model.in_given_time(lambda plant: plant.replace(w=[4.0]))
+    faults = {"force": WindowObserver(free, FIRST), "pull": WindowObserver(other, FIRST)}
+    both = ArchitectureII(WindowObserver(model, FIRST), faults, WindowObserver(everything, FIRST))
+    record = both.run(log)
+    assert record.fault == "force"
+    assert record.died_at["force"] is None
+    sampled = ArchitectureII(
+        WindowObserver(model, FIRST),
+        {"force": WindowObserver(free, FIRST), "pull": WindowObserver(other, FIRST)},
+        WindowObserver(everything, FIRST),
+    )
+    assert sampled.run(replace(log, events=False)).fault != "force"
+
+
+@pytest.mark.parametrize("kind", OBSERVERS)
+def test_a_pickle_goes_on_bit_for_bit(kind: str) -> None:
+    model, log = UncertainModel.from_continuous(**INTEGRATOR), integrator_log()
+    observer = OBSERVERS[kind](model, FIRST)
+    for _ in zip(range(10), drive(observer, log), strict=False):
+        pass
+    again = pickle.loads(pickle.dumps(observer))
+    one, two = (o.step(log.u[9], log.y[10], dt=0.123) for o in (observer, again))
+    assert np.array(one.box).tobytes() == np.array(two.box).tobytes()
 
 
 def test_a_chain_of_bounds_is_proven_at_times_of_its_own() -> None:

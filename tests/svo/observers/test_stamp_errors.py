@@ -97,6 +97,30 @@ def test_a_nonlinear_widening_is_that_of_the_same_linear_plant() -> None:
     np.testing.assert_allclose(found.R, [0.1 * (3.0 + 0.1 * 1.1), 0.3 * 1.1], rtol=1e-6)
 
 
+def test_a_flow_meter_reads_the_flow_of_its_own_time() -> None:
+    """A disturbance in an output is not that of the stamp, so its row has its range instead."""
+    model = NonlinearModel(
+        lambda x, w: [-x[0] + w[0]], lambda x, w: [x[0], w[0]], states=["h"], disturbances=["q"], Ts=0.5, n=0.01,
+        w=([1.0], [3.0]), largest=([0], [9]), jitter=[0.0, 0.1],
+    )  # fmt: skip
+    none = np.zeros(0)
+    found = model.output_near(np.array([2.0]), np.array([2.5]), none, (none, none))
+    assert found.F[1].tolist() == [0.0]
+    assert (found.c[1], found.R[1]) == (pytest.approx(2.0), pytest.approx(1.0))
+    assert found.R[0] == pytest.approx(0.0, abs=1e-12)
+    same = UncertainModel.from_continuous(
+        [[-1.0]], None, [[1.0], [0.0]], E=[[1.0]], F=[[0.0], [1.0]], w=([1.0], [3.0]), n=[0.01, 0.01], Ts=0.5,
+        jitter=[0.0, 0.1],
+    )  # fmt: skip
+    assert same.origin is not None
+    stamps = same.origin.stamps
+    assert stamps is not None
+    assert stamps.shift.tolist() == [0.0, 2.0]
+    widening = stamps.widening((np.array([2.0]), np.array([2.5])), (none, none), none)
+    np.testing.assert_allclose(widening, [0.0, 1.0], rtol=1e-8)
+    assert not stamps.applied(same.stack(), stamps.shift)[0, 2, 2:].any()
+
+
 def test_a_feedthrough_is_that_of_either_input() -> None:
     stamps = StampErrors(
         UncertainModel(**CART | {"D": [[0.5], [0.0]], "A": np.zeros((2, 2)), "w": [0.0]}), np.array([1e-9, 0.0])
