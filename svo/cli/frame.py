@@ -127,18 +127,10 @@ def fail(message: str, code: int = 1) -> None:
 
 
 def plant_to_simulate(name: str) -> Plant:
-    """The registered plant of that name, for the commands that a description alone is not enough for."""
-    from svo.plant import load_plant, registered_plants
-    from svo.plant.description.find import SUFFIX
+    """The registered plant of that name, or that of a TOML file with a table [simulation]."""
+    from svo.plant.description.find import plant_to_simulate as found
 
-    if name.endswith(SUFFIX):
-        raise ValueError(
-            f"{name}: a TOML file describes a model for logs, and this command needs a plant that it can simulate; "
-            f"expected a registered one: {', '.join(registered_plants()) or 'none is installed'}. Use the file with "
-            "svo detect, svo watch or svo calibrate, or register a plant in Python (docs/studies.md, 'A plant of your "
-            "own')"
-        )
-    return load_plant(name)
+    return found(name)
 
 
 def chosen_noise(plant: MonitoredPlant, noise: str | None) -> str:

@@ -124,6 +124,7 @@ def study(
 
     optional_import("pyarrow", "study", "studies")  # first: what is imported next needs the extra too
     from svo.cli.progress import busy, progress
+    from svo.plant.description.find import check_kept_description, keep_description
     from svo.studies.added import added_study
     from svo.studies.configuration import StudyConfiguration
     from svo.studies.isolation.runner import run_study
@@ -148,10 +149,12 @@ def study(
         "scheduler": scheduler,
         "limit": own_processes(limit, scheduler, _LIMIT),
     }
+    check_kept_description(the_plant, out)
     with progress("Runs") as update:
         folder = run(configuration, out, resume=resume, retry_failed=retry_failed, progress=update, **place)
     with busy("Writing summary, pictures and report"):
         show(folder, the_plant, formats.split(","), {"configuration": configuration.to_dict()} if as_json else None)
+    keep_description(the_plant, out)
     if not as_json:
         typer.echo(f"Report: {out / 'report.html'}")
     tell_failures(all_failures(folder, the_plant), "runs")
@@ -181,14 +184,13 @@ def report(
 
     optional_import("pyarrow", "study", "studies")  # first: what is imported next needs the extra too
     from svo.cli.progress import busy
-    from svo.plant import load_plant
     from svo.studies.isolation.publish import publish
     from svo.studies.isolation.store import StudyFolder
     from svo.studies.thresholds import LearnsDetectors
     from svo.studies.thresholds import publish as publish_detectors
 
     study = StudyFolder(folder)
-    the_plant = load_plant(study.identity()["configuration"]["plant"])
+    the_plant = plant_to_simulate(study.identity()["configuration"]["plant"])
     with busy("Writing summary, pictures and report"):
         if isinstance(the_plant, LearnsDetectors):
             publish_detectors(study, the_plant, without_damaged, formats.split(","))

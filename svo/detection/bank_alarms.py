@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -126,7 +127,7 @@ def digest_of_alarm(observer: Observer, certificate: Certificate) -> str:
 def source_of_bank(plant: MonitoredPlant) -> dict[str, str]:
     """Which bank an alarm comes from, as stored with it: the plant, and which of its banks if there is a choice."""
     chosen = {name: value for name, value in bank_choice(plant)._asdict().items() if value is not None}
-    return {"plant": plant.name, **chosen}
+    return {"plant": Path(plant.name).name, **chosen}  # a file stands beside its alarms
 
 
 def bank_of_source(source: Mapping[str, str | int | float]) -> BankChoice:

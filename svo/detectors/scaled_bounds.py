@@ -8,10 +8,12 @@ import numpy as np
 
 from svo.checks import expect
 from svo.faults.blocks import disturbance_edges, mapped, with_noise
+from svo.faults.equations import Model
 from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 
 
-def scaled_bounds(model: UncertainModel, scale: float) -> UncertainModel:
+def scaled_bounds(model: Model, scale: float) -> Model:
     """The model with its disturbance set scaled about its middle, and its noise half-widths scaled.
 
     Intervals of uncertainties stay as they are: they say which faults and plants the model stands for.
@@ -24,6 +26,10 @@ def scaled_bounds(model: UncertainModel, scale: float) -> UncertainModel:
     expect(np.isfinite(scale) and scale > 0, "scale", scale, "a positive number, 1 for the bounds as stated")
     if scale == 1.0:
         return model
+    if isinstance(model, NonlinearModel):
+        low, high = (end[: model.n_disturbances] for end in model.flow.w)
+        middle, half = 0.5 * (low + high), 0.5 * scale * (high - low)
+        return model.replace(w=(middle - half, middle + half), n=scale * model.noise)
     return model.replace(w=_disturbances(model, scale), n=with_noise(model, lambda noise: scale * noise))
 
 

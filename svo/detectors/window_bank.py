@@ -18,6 +18,7 @@ from svo.isolation import ArchitectureI
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models import UncertainModel
+from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.observer import WindowObserver
 
 NOMINAL = "nominal"
@@ -34,7 +35,7 @@ class WindowBank(Shown):
 
     Parameters
     ----------
-    models : mapping of str to UncertainModel
+    models : mapping of str to UncertainModel or NonlinearModel
         "nominal" and one for each fault, which contains the nominal plant. Without faults it only detects.
     initial : HPolytope
         Bounded set of the state at the first sample.
@@ -46,7 +47,7 @@ class WindowBank(Shown):
         Directions in which the nominal observer's set is measured at every sample; costs linear programs.
     """
 
-    models: Mapping[str, UncertainModel]
+    models: Mapping[str, UncertainModel | NonlinearModel]
     initial: HPolytope
     horizon: int | None = 10
     stated: bool = False
@@ -102,7 +103,8 @@ class WindowBank(Shown):
 
     def _observer(self, name: str, scale: float, log: Log) -> WindowObserver:
         """Its model is evaluated for the whole log at once; the schedule of a sample is its number."""
-        model = scaled_bounds(self.models[name].along(log.schedule), scale)
+        own: Any = self.models[name]
+        model = scaled_bounds(own if isinstance(own, NonlinearModel) else own.along(log.schedule), scale)
         return WindowObserver(model, self.initial, horizon=self.horizon)
 
     def _falsified(self, log: Log, scale: float) -> bool:
@@ -148,4 +150,6 @@ class WindowBank(Shown):
 
 def _drive(driven: Any, log: Log) -> Iterator[Any]:
     """The answers over a log of what is driven along it: the schedule of sample k is the number k."""
-    return drive(driven, replace(log, schedule=np.arange(len(log), dtype=float)))
+    observers = driven.observers.values() if isinstance(driven, ArchitectureI) else [driven]
+    is_linear = not any(isinstance(observer.model, NonlinearModel) for observer in observers)
+    return drive(driven, replace(log, schedule=np.arange(len(log), dtype=float) if is_linear else None))

@@ -19,7 +19,6 @@ from polytopes.shown import Shown
 from svo.isolation import Bank
 from svo.logs.log import Log
 from svo.logs.names import Columns
-from svo.models import UncertainModel
 from svo.plant.scheduling import Scheduler
 
 HEALTHY = "none"
@@ -148,12 +147,12 @@ class StatedFault(Shown):
     ----------
     description : str
         The fault and its size, for people.
-    model : UncertainModel
+    model : UncertainModel or NonlinearModel
         The plant with exactly this fault; unlike an observer's model it does not contain the fault-free plant.
     """
 
     description: str
-    model: UncertainModel
+    model: Any
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Any
 
-from svo.plant import Plant, load_plant
+from svo.plant import Plant
+from svo.plant.description.find import plant_to_simulate
 from svo.studies.added import added_failures, added_study, publish_added, run_added
 from svo.studies.configuration import Job, StudyConfiguration
 from svo.studies.engine import Place, Progress, complete, within
@@ -16,7 +17,7 @@ from svo.studies.store import StudyStore
 @cache
 def registered_plant(name: str) -> Plant:
     """A plant by its name; loaded once a process, since its tables may take a while."""
-    return load_plant(name)
+    return plant_to_simulate(name)
 
 
 def run_into(

@@ -24,10 +24,15 @@ KEYS = {
 
 @dataclass(frozen=True)
 class FaultModel(Shown):
-    """An observer's model of a fault, and whether the healthy plant is one of the plants that it describes."""
+    """An observer's model of a fault, and whether the healthy plant is one of the plants that it describes.
+
+    Of a nonlinear plant also how it is simulated: the fault that is ``acting``, or the parameters that are ``moved``.
+    """
 
     model: UncertainModel | NonlinearModel
     contains_nominal: bool
+    acting: Any = None
+    moved: tuple[str, ...] = ()
 
 
 def faults_of(top: Table, nominal: UncertainModel, names: Mapping[str, Sequence[str]]) -> dict[str, FaultModel]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from polytopes.signatures import options_by_name
 from svo.checks import expect_kind
-from svo.plant import BankChoice, MonitoredPlant, load_plant, registered_plants, with_bank
+from svo.plant import BankChoice, MonitoredPlant, Plant, load_plant, registered_plants, with_bank
 from svo.plant.description.plant import DescribedPlant, read_description
+from svo.plant.description.simulated import SimulatedPlant, simulated_plant
 from svo.store import digest_of, write_whole
 
 SUFFIX = ".toml"
@@ -54,6 +56,25 @@ def _found(name: str, folder: Path) -> MonitoredPlant:
     return load_plant(name)
 
 
+def plant_to_simulate(name: str) -> Plant:
+    """A registered plant by its name, or one with a table [simulation] by the path of its TOML file.
+
+    Raises
+    ------
+    ValueError, OSError
+        As `find_plant`, and for a file that describes no simulation.
+    """
+    found: Any = simulated_plant(name) if name.endswith(SUFFIX) else load_plant(name)
+    plant: Plant = found
+    return plant
+
+
+def described(plant: Any) -> DescribedPlant | None:
+    """The description of a plant that has one, simulated or not."""
+    own = plant.described if isinstance(plant, SimulatedPlant) else plant
+    return own if isinstance(own, DescribedPlant) else None
+
+
 def check_kept_description(plant: MonitoredPlant, folder: Path) -> None:
     """Raise a ValueError if another description stands where `keep_description` would put that of a plant."""
     for file, copy in _copies(plant, folder):
@@ -82,12 +103,14 @@ def keep_description(plant: MonitoredPlant, folder: Path, overwrite: bool = Fals
 
 def description_digest(plant: MonitoredPlant) -> dict[str, str]:
     """SHA-256 of each file that describes a plant, by name; a registered plant has none."""
-    return {file.name: digest_of(file) for file in plant.files} if isinstance(plant, DescribedPlant) else {}
+    own = described(plant)
+    return {} if own is None else {file.name: digest_of(file) for file in own.files}
 
 
 def _copies(plant: MonitoredPlant, folder: Path) -> list[tuple[Path, Path]]:
     """The files of a description and where they are kept."""
-    if not isinstance(plant, DescribedPlant):
+    own = described(plant)
+    if own is None:
         return []
-    home = plant.files[0].parent
-    return [(file, folder / file.relative_to(home)) for file in plant.files]
+    home = own.files[0].parent
+    return [(file, folder / file.relative_to(home)) for file in own.files]

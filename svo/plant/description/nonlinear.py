@@ -65,7 +65,8 @@ def _fault(table: Table, nominal: NonlinearModel, names: Mapping[str, Sequence[s
         return _parameters(table, nominal)
     table.check_keys(("type", *_FAULTS[kind]))
     with table.errors():
-        return FaultModel(fault_of(table, kind, names).model(nominal), contains_nominal=True)
+        acting = fault_of(table, kind, names)
+        return FaultModel(acting.model(nominal), contains_nominal=True, acting=acting)
 
 
 def _parameters(table: Table, nominal: NonlinearModel) -> FaultModel:
@@ -86,8 +87,9 @@ def _parameters(table: Table, nominal: NonlinearModel) -> FaultModel:
     with table.errors():
         model = nominal.replace(parameters={**nominal.parameters, **changed}, constant=still, **equations)
     if rows:
-        return FaultModel(model, table.truth("contains_nominal", False))
-    return FaultModel(model, contains_nominal=all(_contains(model, nominal, name) for name in changed))
+        return FaultModel(model, table.truth("contains_nominal", False), moved=tuple(changed))
+    contains = all(_contains(model, nominal, name) for name in changed)
+    return FaultModel(model, contains, moved=tuple(changed))
 
 
 def _contains(wider: NonlinearModel, model: NonlinearModel, name: str) -> bool:

@@ -32,9 +32,9 @@ from svo.plant.description.nonlinear import is_nonlinear, nonlinear_faults_of, n
 from svo.plant.description.table import Table, read_table
 from svo.plant.log_file import read_log
 
-_TOP = (
+TOP = (
     "title", "Ts", "columns", "log", "model", "initial", "observer", "faults", "global", "bank", "interval_detector",
-    "parameters",
+    "parameters", "simulation",
 )  # fmt: skip
 STATED = "stated"
 Model: TypeAlias = UncertainModel | NonlinearModel
@@ -151,7 +151,7 @@ def read_description(path: str | Path) -> DescribedPlant:
         If the file cannot be opened.
     """
     path = Path(path)
-    top = read_table(path, _TOP)
+    top = read_table(path, TOP)
     columns = _columns(top)
     names = {group: [c.name for c in getattr(columns, group)] for group in ("inputs", "outputs", "states")}
     model: Model
@@ -159,6 +159,8 @@ def read_description(path: str | Path) -> DescribedPlant:
         model = nonlinear_model_of(top, names)
         faults = nonlinear_faults_of(top, model)
     else:
+        if "simulation" in top:
+            raise top.error("simulation", "has no meaning for a linear model; drop it")
         model = model_of(top, {group: found for group, found in names.items() if found})
         faults = faults_of(top, model, names)
     initial = _box(top, "initial", model)

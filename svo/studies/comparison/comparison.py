@@ -13,7 +13,8 @@ import numpy as np
 from svo.checks import expect
 from svo.detectors.detector import Detector, Kind, Setting
 from svo.logs.log import Log
-from svo.plant import HEALTHY, Distribution, Plant, fault_start, first_faulty_sample, load_plant
+from svo.plant import HEALTHY, Distribution, Plant, fault_start, first_faulty_sample
+from svo.plant.description.find import plant_to_simulate
 from svo.studies.attempt import Failed, attempt
 from svo.studies.comparison.offer import ComparesDetectors
 from svo.studies.comparison.run import ComparedRun, Condition, compare_run
@@ -193,7 +194,7 @@ def run_comparison(
 @functools.cache
 def compared_plant(name: str) -> ComparesDetectors:
     """The registered plant, which offers a comparison; loaded once a process."""
-    plant = load_plant(name)
+    plant = plant_to_simulate(name)
     if not isinstance(plant, ComparesDetectors):
         raise TypeError(f"plant {name!r} offers no detectors to compare; it lacks members of ComparesDetectors")
     return plant
