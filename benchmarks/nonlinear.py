@@ -28,7 +28,7 @@ from svo.logs.log import Log
 from tests.svo.models.nonlinear_plants import CASES, Case
 from tests.svo.models.nonlinear_runs import MUST_NOT, Findings, examine_run
 from tests.svo.models.nonlinear_truth import simulated
-from tests.svo.models.plants_of_the_field import AIRCRAFT, FIELD
+from tests.svo.models.plants_of_the_field import AIRCRAFT, FIELD, ignition
 from tests.svo.models.random_nonlinear import random_plant
 from tests.svo.models.units import in_other_units
 
@@ -36,9 +36,11 @@ SEED = 20_261_129
 RUN, BATCH = 100, 36  # samples of a run, runs of a batch
 MODES = ("corners", "inside", "constant")
 INTERVALS = 0.9  # of Ts
-RANDOM = 20
+RANDOM, MAPS = 20, 5  # plants in continuous and in discrete time
 PLANTS: dict[str, Callable[..., Case]] = {
     **CASES, **AIRCRAFT, **FIELD, **{f"random {i}": partial(random_plant, i) for i in range(RANDOM)},
+    **{f"random map {i}": partial(random_plant, i, continuous=False) for i in range(RANDOM, RANDOM + MAPS)},
+    "ignition": ignition,
 }  # fmt: skip
 
 
@@ -48,7 +50,7 @@ def examine(name: str, i: int, runs: int = BATCH, samples: int = RUN) -> dict[st
     case = PLANTS[name](**({"varying": "all"} if i % 2 else {}))
     if i // 2 % 2:
         case = in_other_units(case, rng)
-    by_events = i % 3 == 2
+    by_events = i % 3 == 2 and case.model.continuous
     made = simulated(case, samples, rng, [MODES[j % 3] for j in range(runs)], INTERVALS if by_events else 0.0)
     found, begun = Findings(Counter(), []), process_time()
     for j in range(runs):

@@ -124,15 +124,15 @@ class Recorder:
 
     def _size_of(self, slot: int, signs: dict[int, int]) -> tuple[int, int | None] | None:
         """e, and the slot of c > 0 or None for 1, where a slot is c |e| with an e whose sign is at hand."""
-        op, of, _ = self.slots[slot]
-        if op is Op.ABS and of[0] in signs:
-            return of[0], None
-        if op is Op.MUL:
-            for one, other in (of, of[::-1]):
-                kind, below, values = self.slots[one][0], self.slots[other][1], self.slots[one][2]
-                if kind is Op.CONSTANT and values[0] > 0.0 and self.slots[other][0] is Op.ABS and below[0] in signs:
-                    return below[0], one
-        return None
+        factors = self._factors(slot)
+        sizes = [i for i in factors if self.slots[i][0] is Op.ABS and self.slots[i][1][0] in signs]
+        if not sizes:
+            return None
+        rest = self._without(slot, sizes[0])
+        if not all(self.slots[i][0] is Op.CONSTANT and self.slots[i][2][0] > 0.0 for i in rest):
+            return None
+        scale = reduce(self.product, (Expression(self, i) for i in rest)).slot if rest else None
+        return self.slots[sizes[0]][1][0], scale
 
     def _factors(self, slot: int) -> list[int]:
         """The slots that a product comes from; of one with very many, those products that are left."""

@@ -52,6 +52,8 @@ def test_one_reads_the_other() -> None:
         lambda e: 3.0 * F.sign(e) * F.sqrt(1962.0 * F.abs(e)),
         lambda e: F.sqrt(abs(e) * 1962.0) * (F.sign(e) * 3.0),
         lambda e: F.sign(e) * (3.0 * F.sqrt(1962.0 * abs(e))),
+        lambda e: 3.0 * F.sign(e) * F.sqrt(2.0 * (981.0 * abs(e))),
+        lambda e: F.sqrt(3924.0 * abs(e) / 2.0) * F.sign(e) * 3.0,
     ):
         form = over(traced(lambda z, written=written: [written(z[0] - z[1])], 2), [1, 1], [2, 2])
         assert form.high[0] - form.low[0] == pytest.approx(plain.high[0] - plain.low[0], rel=1e-9)

@@ -47,7 +47,7 @@ def examine_linearisation(case: Case, rng: np.random.Generator, count: int) -> C
     few = slice(0, INTEGRATED)
     room = np.maximum(TOLERANCE * move.R, 1e-14 * (np.abs(lower) + np.abs(upper)))[:, None]
     end, error = advanced(model, x[:, few], w[:, few], inputs[:, few], np.full(len(x[0, few]), T), room)
-    held = ~model.flow.varying
+    held = ~model.flow.varying | (not model.continuous)
     if model.continuous:
         part = T * rng.random(len(x[0, few]))
         way, off = advanced(model, x[:, few], w[:, few], inputs[:, few], part, room)

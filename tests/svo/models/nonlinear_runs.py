@@ -161,7 +161,8 @@ def _check_moves(model: Watched, one: Runs, k: int, lost: Array, found: Findings
     """The true transition from sample k against those that were made of it."""
     if k + 1 >= len(one.x):
         return
-    held, x, after = ~model.flow.varying, one.x[k], one.x[k + 1]
+    held = ~model.flow.varying | (not model.continuous)  # in discrete time nothing happens inside a sample
+    x, after = one.x[k], one.x[k + 1]
     for found_here, box in model.moves:
         move = _Move.of(found_here, len(x))
         size = np.abs(move.A) @ np.abs(x) + np.abs(move.a) + np.abs(move.E) @ (np.abs(one.w[k]) * held)

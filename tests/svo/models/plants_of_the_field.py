@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from aircraft.eclipse.trim import level_trim
 from aircraft.missile.airframe import Airframe
 from svo.functions import abs, atan2, cos, exp, log, max, min, sign, sin, tanh
 from svo.models.nonlinear import NonlinearModel
-from tests.svo.models.nonlinear_plants import Case
+from tests.svo.models.nonlinear_plants import Case, cstr
 
 
 def two_link_arm(**changes: Any) -> Case:
@@ -238,6 +239,11 @@ def eclipse(**changes: Any) -> Case:
     u = lambda k: (trim.u + np.array([np.sin(0.23 * k), 0.05 * np.sin(0.07 * k)])).tolist()  # noqa: E731
     spread = np.array([0.5, 0.3, 0.02, 0.05])
     return Case(models["nominal"].replace(**changes), trim.x, spread, u)
+
+
+def ignition(**changes: Any) -> Case:
+    """The reactor of `cstr` without its controller: it ignites or goes out."""
+    return replace(cstr(**changes), control=None)
 
 
 FIELD = {

@@ -46,7 +46,8 @@ def expression(rng: np.random.Generator, leaves: int, depth: int) -> Node:
 def random_plant(i: int, **changes: Any) -> Case:
     """Plant number i: one to four states, each pulled back to zero, so that the state stays bounded by itself.
 
-    In two of five the first state is a level that runs out through a root and is never below zero.
+    In two of five the first state is a level that runs out through a root and is never below zero. In discrete time it
+    is a step of Euler's method.
     """
     rng = np.random.default_rng([SEED, i])
     n, nu, nw, np_ = int(rng.integers(1, 5)), *(int(v) for v in rng.integers(0, 3, 3))
@@ -83,11 +84,17 @@ def random_plant(i: int, **changes: Any) -> Case:
     parts = [[f"{a}{j}" for j in range(size)] for a, size in zip(names, (n, nu, nw, np_), strict=True)]
     slow, phase, size = rng.uniform(0.02, 0.3, nu), rng.uniform(0.0, 6.0, nu), rng.uniform(0.3, 1.5, nu)
     square = rng.random(nu) < 0.3
-    used = _of_used_arguments(f, h, nu, nw, np_)
+    Ts = float(10.0 ** rng.uniform(-2.0, -0.7))
+
+    def after(x: Any, u: Any, w: Any, p: Any) -> list[Any]:
+        moved = [x[j] + Ts * row for j, row in enumerate(f(x, u, w, p))]
+        return [sf.max(moved[0], 0.0), *moved[1:]] if is_level else moved
+
+    used = _of_used_arguments(f if changes.get("continuous", True) else after, h, nu, nw, np_)
     model = NonlinearModel(
         *used, states=parts[0], inputs=parts[1], disturbances=parts[2],
         parameters={name: (a, a + b) for name, a, b in zip(parts[3], about, size_p, strict=True)},
-        Ts=float(10.0 ** rng.uniform(-2.0, -0.7)), n=10.0 ** rng.uniform(-3.0, -1.0, len(plain) + len(readings)),
+        Ts=Ts, n=10.0 ** rng.uniform(-3.0, -1.0, len(plain) + len(readings)),
         w=10.0 ** rng.uniform(-2.5, -0.5, nw), largest=(lower, upper), physical=physical, **changes,
     )  # fmt: skip
 

@@ -20,7 +20,7 @@ from tests.svo.models.units import in_other_units
 # Held and varying, exact and random intervals, other units: batch i as in `benchmarks.nonlinear`.
 SHORT = [
     ("cstr", 2), ("servo", 1), ("bioreactor", 0), ("predator", 7), ("battery", 5), ("missile", 1),
-    ("random 1", 1), ("random 7", 2), ("random 12", 3), ("random 17", 5),
+    ("random map 21", 1), ("random 1", 1), ("random 7", 2), ("random 12", 3), ("random 17", 5),
 ]  # fmt: skip
 
 
@@ -37,6 +37,14 @@ def test_sets_verdicts_and_linearisations_hold_the_truth(name: str, batch: int) 
     assert found["count"]["samples"] == 24
     assert found["count"]["transitions"] == 22
     assert found["count"]["outputs"] == 24
+
+
+def test_a_runaway_is_undecided_and_counted_apart() -> None:
+    found = examine("ignition", 1, runs=4, samples=40)["count"]
+    assert found["runaway"] > 20
+    assert found["undecided in a runaway"] > 0
+    assert not refuted(found)
+    assert not found.get("undecided in normal operation")
 
 
 def test_some_transition_uses_nearly_all_of_its_remainder() -> None:
