@@ -137,7 +137,8 @@ def report(runs: list[Found]) -> bool:
     _print_manoeuvres(large)
     for case, samples in later:
         print(f"isolated later by {samples:.3g} samples in the median: {case}")
-    print(f"median isolation later than the linear bank's: {len(later)} of {len(list(_cases(plain)))} cases")
+    if plain:
+        print(f"median isolation later than the linear bank's: {len(later)} of {len(list(_cases(plain)))} cases")
     cost = (f"{kind} {1e3 * sum(run[kind]['seconds'] for run in runs) / len(runs):.0f} ms" for kind in PLANTS)
     print(f"CPU of a bank over a flight: {', '.join(cost)}")
     total = {what: sum(run[what] for run in runs) for what in ("samples", "true", "outside", "undecided")}
@@ -165,6 +166,8 @@ def _print_delays(runs: list[Found]) -> Iterator[tuple[str, float]]:
         rows.append([*case, len(group), *(f"{m:.3g}" for m in medians)])
         if medians[3] > medians[2]:
             yield " ".join(case), (medians[3] - medians[2]) / PLANTS["lpv"].Ts
+    if not rows:
+        return
     events = [f"{event} (s), {kind}" for event in ("detect", "isolate") for kind in PLANTS]
     table("Medians of the Eclipse's two banks", ["noise", "fault", "profile", "flights", *events], rows)
 
