@@ -58,8 +58,11 @@ class Tube:
         Raises
         ------
         ValueError
-            Naming the set, if the equations do not hold or have no value over it.
+            Naming the set, if the equations do not hold or have no value over it; or if the stamps of readings may be
+            off by a sampling time or more, so that they have the inputs of several.
         """
+        if model.jitter is not None and not model.jitter.max() < model.Ts:
+            raise ValueError(f"jitter is {model.jitter}; expected stamps that are off by less than Ts = {model.Ts:g} s")
         initial = model.whole(initial)
         bounded_box(name, initial, model.n_states)
         lower, upper = first_box(initial, model)

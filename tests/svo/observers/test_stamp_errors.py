@@ -208,6 +208,32 @@ def test_what_knows_nothing_of_stamps_refuses_them() -> None:
         observer.late_update([0.0, np.nan], 0)
 
 
+def test_models_are_told_apart_by_stamps_that_are_off_by_less_than_a_sample() -> None:
+    def tank(a: float, jitter: float | None) -> NonlinearModel:
+        return NonlinearModel(
+            {"h": f"-{a} * sqrt(h)"},
+            {"level": "h"},
+            states=["h"],
+            Ts=0.5,
+            n=[0.01],
+            physical=([0.0], [9.0]),
+            jitter=jitter,
+        )
+
+    start = HPolytope.box([4.0], [4.1])
+
+    def found(jitter: float | None) -> int | None:
+        options = {"initial": start, "u": np.zeros((20, 0))}
+        return distinguishability(tank(0.2, jitter), tank(0.1, jitter), 20, **options).horizon
+
+    exact, late = found(None), found(0.4)
+    assert exact is not None
+    assert late is not None
+    assert late > exact
+    with pytest.raises(ValueError, match="less than Ts"):
+        found(0.5)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
