@@ -260,7 +260,7 @@ class Chain:
             expect(origin == "assumed", "no start of a known kind")
             found = Set.read(step["set"], model.n)
             box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
-            premise = f"the other models leave the state in a set that is ASSUMED at sample {k}, within {box}"
+            premise = f"the state is in a set that is ASSUMED at sample {k} (left by others' models): {box}"
         self.start, self.template = (k, found.within(model.physical)), array(step["template"], None, model.n)
         more = {"the state never leaves the physical range of the model": model.physical is not None,
                 "the model file has the right matrices of each sample: an AXIOM": model.is_scheduled}  # fmt: skip

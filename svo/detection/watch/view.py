@@ -181,12 +181,13 @@ def conclusion(status: Status) -> str:
 
 
 def alarm_text(alarm: Alarm) -> str:
-    """A falsification and what its certificate says, checked again here."""
+    """A falsification and what its certificate says, checked again here, and what that rests on."""
     certificate = alarm.certificate
     first = alarm.sample + 1 - len(certificate.samples)
     window = f"sample {first}" if first == alarm.sample else f"samples {first} to {alarm.sample}"
     holds = "holds in exact arithmetic" if certificate.verify() else "DOES NOT HOLD"
-    return f"ALARM {alarm.time:.9g} s: {alarm.observer} is falsified; its certificate over {window} {holds}"
+    what = f"its certificate over {window} {holds}, given {certificate.premise(alarm.sample)}"
+    return f"ALARM {alarm.time:.9g} s: {alarm.observer} is falsified; {what}"
 
 
 def summary(status: Status | None, why: str) -> str:

@@ -321,7 +321,7 @@ def test_a_set_that_is_assumed_is_a_premise_that_is_printed(case: tuple[Files, i
     steps = deepcopy(steps_of(case[0][0]))
     of_kind(steps, "start")[0]["from"] = "assumed"
     ((_, _, premises),) = claims((with_steps(case[0][0], steps), *case[0][1:]))
-    assert "ASSUMED at sample 0, within -1 to 1" in premises[0]
+    assert "ASSUMED at sample 0 (left by others' models): -1 to 1" in premises[0]
 
 
 def mutated(steps: list[Any], rng: np.random.Generator) -> list[Any]:
