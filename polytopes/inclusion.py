@@ -6,6 +6,7 @@ of the rows at hand, by the rational simplex, or by the generators in integers.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
@@ -43,17 +44,28 @@ def broken_row(P: Rows, Q: Rows) -> int | None:
     UndecidedError
         If Q is too large for rational arithmetic where floats cannot decide.
     """
-    if not known_nonempty(Q):
-        return None
     normals, sides = half_spaces(P)
-    best = Q.program.maximise(normals)
-    doubtful = np.flatnonzero(~(best.values <= sides))
-    excess = np.nan_to_num(best.values[doubtful] - sides[doubtful], nan=-np.inf)
-    for i in doubtful[np.argsort(-excess, kind="stable")].tolist():
-        known = best.status[i] == OPTIMAL and _bounded_by(Q, normals[i], best.multipliers[i], float(sides[i]))
-        if not known and _exceeds(Q, normals[i], float(sides[i]), best.status[i]):
-            return i
+    asked = _not_given(normals, sides, Q)
+    if not asked.size or not known_nonempty(Q):
+        return None
+    best = Q.program.maximise(normals[asked])
+    excess = best.values - sides[asked]
+    doubtful = np.flatnonzero(~(excess <= 0.0))
+    for k in doubtful[np.argsort(-np.nan_to_num(excess[doubtful], nan=-np.inf), kind="stable")].tolist():
+        normal, side = normals[asked[k]], float(sides[asked[k]])
+        known = best.status[k] == OPTIMAL and _bounded_by(Q, normal, best.multipliers[k], side)
+        if not known and _exceeds(Q, normal, side, best.status[k]):
+            return int(asked[k])
     return None
+
+
+def _not_given(normals: Floats, sides: Floats, Q: Rows) -> NDArray[np.int64]:
+    """Numbers of the rows that Q does not have itself, or not with so small a side."""
+    own: dict[bytes, float] = {}
+    for normal, side in zip(*half_spaces(Q), strict=True):
+        own[normal.tobytes()] = min(float(side), own.get(normal.tobytes(), np.inf))
+    given = [own.get(normal.tobytes(), np.inf) <= side for normal, side in zip(normals, sides, strict=True)]
+    return np.flatnonzero(~np.array(given, dtype=bool))
 
 
 def _bounded_by(Q: Rows, normal: Floats, multipliers: Floats, side: float) -> bool:

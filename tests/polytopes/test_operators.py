@@ -139,12 +139,13 @@ def test_sets_compare_as_sets_and_have_no_hash() -> None:
 
 
 def test_what_is_undecided_raises() -> None:
-    P, Q = (HPolytope([[1.0], [-1.0]], [0.5, -0.5]) for _ in range(2))
+    P, Q = HPolytope([[1.0], [-1.0]], [0.5, -0.5]), HPolytope([[2.0], [-2.0]], [1.0, -1.0])
     P.__dict__["decided"] = Emptiness("undecided", None, None, "told so")
     P.__dict__["as_box"] = None
     for ask in (lambda: P == Q, lambda: P <= Q, lambda: P.is_empty(), lambda: Q == P, lambda: 0 * P):
         with pytest.raises(UndecidedError, match="told so"):
             ask()
+    assert P == HPolytope(P.A, P.b)  # the same rows: no question about points
 
 
 def test_wrong_operands_are_refused() -> None:
