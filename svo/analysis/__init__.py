@@ -1,1 +1,1 @@
-"""What can be said before anything runs: distinguishability, input design, isolability, sets of control; and calibration of bounds."""
+"""What can be said before anything runs: distinguishability, input design, isolability, sets of control; calibration."""
