@@ -1,1 +1,1 @@
-"""What can be said before anything runs: distinguishability, input design, isolability, sets of control; calibration."""
+"""What can be said before a run: distinguishability, input design, isolability, sets of control, calibration."""
