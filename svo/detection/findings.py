@@ -78,6 +78,11 @@ class Findings(Shown, ABC):
 
     @property
     @abstractmethod
+    def reason(self) -> str | None:
+        """Of the first undecided answer that has one: the observer, and why."""
+
+    @property
+    @abstractmethod
     def stopped(self) -> int:
         """Programs that ended at a limit."""
 
@@ -112,6 +117,7 @@ class Findings(Shown, ABC):
             "falsified_s": {alarm.observer: alarm.time for alarm in self.alarms},
             "undecided": self.undecided,
             "stopped": self.stopped,
+            **({} if self.reason is None else {"undecided_because": self.reason}),
             "changes": [{"time_s": c.time, "state": c.state, "alive": list(c.alive)} for c in self.changes],
         } | ({} if self.thresholds is None else {"interval_detector": self.thresholds.to_dict()})
 
@@ -161,7 +167,8 @@ class Findings(Shown, ABC):
         if not self.alive:
             yield f"No model explains the data from {self._when(max(alarm.time for alarm in self.alarms))} on."
         if self.undecided:
-            yield f"    undecided answers: {self.undecided}"
+            first = "" if self.reason is None else f", the first of {self.reason}"
+            yield f"    undecided answers: {self.undecided}{first}"
         if self.stopped:
             yield f"    programs that ended at a limit, so that sets are wider: {self.stopped}"
         if self.thresholds is not None:

@@ -77,6 +77,10 @@ class Detection(Findings):
         return int(self.record.undecided.sum())
 
     @property
+    def reason(self) -> str | None:
+        return self.record.reason
+
+    @property
     def stopped(self) -> int:
         return int(self.record.stopped.sum())
 

@@ -66,6 +66,10 @@ class StreamedDetection(Findings):
         return self.outcome.undecided
 
     @property
+    def reason(self) -> str | None:
+        return self.outcome.reason
+
+    @property
     def stopped(self) -> int:
         return self.outcome.stopped
 

@@ -112,6 +112,8 @@ class BankRecord(Shown):
         What computes `boxes`.
     global_seconds : (K,) array or None
         Wall time of the global observer's step, NaN where it was not stepped; None if the bank has none.
+    reason : str or None
+        Of the first undecided answer that has one: the observer, and why.
     """
 
     names: tuple[str, ...]
@@ -130,6 +132,7 @@ class BankRecord(Shown):
     labels: Labels
     replay: Replay
     global_seconds: NDArray[np.float64] | None = None
+    reason: str | None = None
 
     @property
     def time(self) -> Array:

@@ -33,6 +33,8 @@ class Outcome:
     changes : list of Change
     undecided, stopped : int
         Over all samples and the observers of ``names``.
+    reason : str or None
+        Of the first undecided answer that has one: the observer, and why.
     verdict : Verdict
         The latest one.
     """
@@ -46,6 +48,7 @@ class Outcome:
         self.fault: str | None = None
         self.changes: list[Change] = []
         self.undecided = self.stopped = 0
+        self.reason: str | None = None
         self.verdict: Verdict
 
     def add(self, verdict: Verdict, samples: int = 1) -> None:
@@ -56,7 +59,9 @@ class Outcome:
             self.changes.append(now)
         for name, step in verdict.steps.items():
             if name in self.names:
-                self.undecided += step.verdict == "undecided"
+                if step.verdict == "undecided":
+                    self.undecided += 1
+                    self.reason = self.reason or (f"{name}, {step.reason}" if step.reason else None)
                 self.stopped += step.stopped
                 is_dead = name not in verdict.alive
             else:
@@ -119,4 +124,5 @@ class Recorder(Outcome):
             labels=self._labels,
             replay=self._replay,
             global_seconds=self._global_seconds,
+            reason=self.reason,
         )

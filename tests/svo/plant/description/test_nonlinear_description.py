@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from polytopes import HPolytope
-from svo import WindowObserver
+from svo import WindowObserver, detect, read_log
 from svo.cli import app
 from svo.models import ModelSample, model_digest
 from svo.plant.description import read_description
@@ -63,6 +63,21 @@ def test_the_commands_print_what_the_page_shows_and_say_what_is_not_checked(
     assert "bounds of a nonlinear model are not proven from the first sample on" in chain.output
     for line in (tmp_path / "found" / "alarms.jsonl").read_text(encoding="utf-8").splitlines():
         assert json.loads(line)["source"]["model"] == "nonlinear"
+
+
+def test_what_is_undecided_is_shown_with_sample_and_coordinate(tmp_path: Path) -> None:
+    physical = "physical = [[0.0, 0.0], [60.0, 60.0]]"
+    plant = described(tmp_path, physical, f"{physical}\nvalid = [[0.0, 0.0], [38.0, 60.0]]")
+    files = tmp_path / "two_tanks.toml", EXAMPLES / "two_tanks.csv", "--out", tmp_path / "out"
+    done = CliRunner().invoke(app, ["detect", *map(str, files)])
+    assert done.exit_code == 0, done.output
+    said = re.search(r"undecided answers: \d+, the first of (\w+, outside: at sample (\d+), h1 .*)", done.stdout)
+    assert said is not None
+    written = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
+    assert written["undecided_because"] == said[1]
+    found = detect(plant, read_log(EXAMPLES / "two_tanks.csv", plant))
+    assert found.record.reason == found.reason == said[1]
+    assert found.record.undecided[int(said[2])].any()
 
 
 def test_a_watch_goes_on_where_it_was(tmp_path: Path) -> None:
