@@ -69,23 +69,28 @@ static void join_image(const plant *p)
 /* What f adds at most to how far each coordinate is from where it began, in place of bounds over the whole box: where
  * f_i falls with x_i, v = x_i - high_i has v' <= g_ii v + F, F being the form's bound at x_i = high_i, and v <= 0 at
  * first: so v(t) <= t max(F, 0), whatever f_i is at a smaller x_i. */
-static void hold_at_faces(const plant *p)
+ends rates_at_faces(const plant *p, integer i)
 {
     const integer count = p->n + p->nw;
     const double *c = p->f.centre, *radius = p->f.radius;
+    const form *f = row_of(&p->f, i);
+    const double own = f->g[i];
+    double others = 0.0;
+    for (integer j = 0; j < count; j++)
+        if (j != i) others += fabs(f->g[j]) * radius[j];
+    const double size = others + fabs(own) * radius[i] + fabs(f->k) + fabs(f->rest.low) + fabs(f->rest.high);
+    const double lost = (double)(count + 8) * ROUNDING * size;
+    return (ends){.low = f->k + own * (p->before.low[i] - c[i]) - others + f->rest.low - lost,
+                  .high = f->k + own * (p->before.high[i] - c[i]) + others + f->rest.high + lost};
+}
+
+static void hold_at_faces(const plant *p)
+{
     for (integer i = 0; i < p->n; i++) {
-        const form *f = row_of(&p->f, i);
-        const double own = f->g[i];
-        double others = 0.0;
-        if (own > 0.0) continue;
-        for (integer j = 0; j < count; j++)
-            if (j != i) others += fabs(f->g[j]) * radius[j];
-        const double size = others + fabs(own) * radius[i] + fabs(f->k) + fabs(f->rest.low) + fabs(f->rest.high);
-        const double lost = (double)(count + 8) * ROUNDING * size;
-        const double low = f->k + own * (p->before.low[i] - c[i]) - others + f->rest.low - lost;
-        const double high = f->k + own * (p->before.high[i] - c[i]) + others + f->rest.high + lost;
-        p->rate.low[i] = larger(low, p->rate.low[i]);
-        p->rate.high[i] = smaller(high, p->rate.high[i]);
+        if (row_of(&p->f, i)->g[i] > 0.0) continue;
+        const ends at = rates_at_faces(p, i);
+        p->rate.low[i] = larger(at.low, p->rate.low[i]);
+        p->rate.high[i] = smaller(at.high, p->rate.high[i]);
     }
 }
 

@@ -14,7 +14,7 @@ static const double TINIEST = 0x1p-1000;   /* more than underflow takes */
 
 /* What came of a call, and why another substep would have been needed. */
 enum { DONE, TOO_MANY_SUBSTEPS, OUTSIDE_VALID, NOT_PHYSICAL, TOO_WIDE, NOT_ENCLOSED };
-enum { MOVES_TOO_FAR, NO_BOX, NO_RANGE };
+enum { NO_BOX, NO_RANGE };
 
 /* The row of a function or the coordinate of the state, the reason and operation of a refusal; ends of a range, a time. */
 typedef struct { integer code, why, row, reason, op; double low, high, time; } outcome;
@@ -56,6 +56,11 @@ int plant_forms(plant *p, outcome *found);
 
 /* Cut by what is physical; where nothing is left, as it is. */
 void cut_by_physical(const plant *p, span x);
+
+/* Bounds of f_i where x_i is at the ends that it had in p->before: in a row whose own slope is not above zero, those of
+ * how it moves away from them. */
+typedef struct { double low, high; } ends;
+ends rates_at_faces(const plant *p, integer i);
 
 /* A box (in z) that holds x(t) within a time h from `before` on, and the forms of f over it; 0 if none is found. */
 int plant_enclose(plant *p, double h, outcome *found);

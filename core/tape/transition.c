@@ -2,6 +2,9 @@
  *
  * Conservative linearisation (Althoff, Stursberg and Buss, CDC 2008) with secants for Jacobians: substep by substep an
  * enclosure, linear forms over it, an enclosed exponential, and the remainder carried through the integral of exp(M t).
+ *
+ * A state whose slope is too steep for the shortest substep (a root near zero, a fast lag) has no line: x_i is anywhere
+ * in its bounds at the end, and what it adds to the others is in their remainder.
  */
 #include "tape/matrix_exponential.h"
 #include "tape/plant.h"
@@ -11,6 +14,7 @@
 
 static const integer FINEST = 4096; /* substeps are multiples of so small a part of the sample */
 static const integer MOST_SUBSTEPS = 200;
+static const integer BEFORE_FLAT = 16;  /* substeps that states have which no number of substeps would give lines */
 static const double WORTH_ANOTHER = 0.1; /* of the width of the set: a remainder beyond it is worth a second substep */
 
 static transition transition_in(Memory *memory, const plant *p)
@@ -21,16 +25,17 @@ static transition transition_in(Memory *memory, const plant *p)
     return t;
 }
 
-/* The dynamics within a substep, x in `start`: dx/dt in J x + W w + q + [-drive, drive], and bounds of what it has. */
-typedef struct { double *J, *gain_w, *q, *drive, *most, *unit; } local;
+/* The dynamics within a substep, x in `start`: dx/dt in J x + W w + q + [-drive, drive], and bounds of what it has; for
+ * states whose `steep` is 0, the others having none. */
+typedef struct { double *J, *gain_w, *q, *drive, *most, *unit, *steep; } local;
 
 static local local_in(Memory *memory, const plant *p)
 {
     const integer n = p->n;
     local d;
-    double **parts[] = {&d.J, &d.gain_w, &d.q, &d.drive, &d.most, &d.unit};
-    const integer lengths[] = {n * n, n * p->nw, n, n, n, n};
-    for (int i = 0; i < 6; i++) *parts[i] = doubles(memory, lengths[i]);
+    double **parts[] = {&d.J, &d.gain_w, &d.q, &d.drive, &d.most, &d.unit, &d.steep};
+    const integer lengths[] = {n * n, n * p->nw, n, n, n, n, n};
+    for (int i = 0; i < 7; i++) *parts[i] = doubles(memory, lengths[i]);
     return d;
 }
 
@@ -44,11 +49,19 @@ static double power_near(double value) /* 2^round(log2 value) */
     return power_of_two(times_power(value, -e) < 0.70710678118654757 ? e - 1 : e);
 }
 
-/* Sets J and units; returns |D^-1 J D| h, D being powers of two near what the box and J move within h. */
-static double scaled_norm(const plant *p, double h, double *moved, local *d)
+/* The sum of row i of |D^-1 J D| h, D being the units. */
+static double scaled_row(const local *d, integer i, integer n, double h)
+{
+    double total = 0.0;
+    for (integer j = 0; j < n; j++) total += fabs(d->J[i * n + j]) * d->unit[j] / d->unit[i];
+    return total * h;
+}
+
+/* Sets J and units, powers of two near what the box and J move within h, and which states are steep. */
+static void take_slopes(const plant *p, double h, double *moved, local *d)
 {
     const integer n = p->n;
-    double *reach = d->q, norm = 0.0;
+    double *reach = d->q;
     for (integer i = 0; i < n; i++) {
         copy(d->J + i * n, row_of(&p->f, i)->g, n);
         reach[i] = p->z.high[i] - p->z.low[i] + 1e-12 * largest_of(p->z, i) + 1e-100;
@@ -63,12 +76,30 @@ static double scaled_norm(const plant *p, double h, double *moved, local *d)
         for (integer j = 0; j < n; j++) total += fabs(d->J[i * n + j]) * moved[j];
         d->unit[i] = power_near(reach[i] + moved[i] + 2.0 * h * total);
     }
-    for (integer i = 0; i < n; i++) {
-        double total = 0.0;
-        for (integer j = 0; j < n; j++) total += fabs(d->J[i * n + j]) * d->unit[j] / d->unit[i];
-        norm = larger(total * h, norm);
-        if (total != total) norm = INFINITY;
+    for (integer i = 0; i < n; i++) d->steep[i] = scaled_row(d, i, n, h) <= 1.0 ? 0.0 : 1.0;
+}
+
+/* Whether lines over a substep of such a size are worth no shorter one: no state is steep, or those that are would be in
+ * any of MOST_SUBSTEPS. */
+static int is_short_enough(const plant *p, const local *d, double T, integer size)
+{
+    int is = 1;
+    for (integer i = 0; i < p->n; i++) {
+        const int pulls = d->J[i * p->n + i] * T < -(double)MOST_SUBSTEPS && FINEST / size >= BEFORE_FLAT;
+        is &= d->steep[i] == 0.0 || pulls || FINEST / size > MOST_SUBSTEPS;
     }
+    return is;
+}
+
+/* Leaves what steep states are, and what they add to others, out of J; returns the norm of the rest, at most 1. */
+static double flatten(const plant *p, double h, local *d)
+{
+    const integer n = p->n;
+    double norm = 0.0;
+    for (integer i = 0; i < n; i++)
+        for (integer j = 0; j < n; j++)
+            if (d->steep[i] != 0.0 || d->steep[j] != 0.0) d->J[i * n + j] = 0.0;
+    for (integer i = 0; i < n; i++) norm = larger(scaled_row(d, i, n, h), norm);
     return norm;
 }
 
@@ -88,7 +119,17 @@ static void take_local(const plant *p, local *d)
         const form *f = row_of(&p->f, i);
         const double half = 0.5 * (f->rest.low + f->rest.high), rest = 0.5 * (f->rest.high - f->rest.low);
         double size = fabs(f->k) + fabs(f->rest.low) + fabs(f->rest.high), q = f->k + half, moving = 0.0, most = 0.0;
-        for (integer j = 0; j < n; j++) q -= f->g[j] * c[j], size += fabs(f->g[j] * c[j]);
+        if (d->steep[i] != 0.0) {
+            d->q[i] = d->drive[i] = d->most[i] = 0.0;
+            continue;
+        }
+        for (integer j = 0; j < n; j++) {
+            size += fabs(f->g[j] * c[j]);
+            if (d->steep[j] != 0.0)
+                moving += fabs(f->g[j]) * (0.5 * (p->z.high[j] - p->z.low[j]) * (1.0 + EPS));
+            else
+                q -= f->g[j] * c[j];
+        }
         for (integer j = 0; j < nw; j++) {
             const double g = f->g[n + j];
             q -= g * c[n + j] * p->held[j]; /* what varies stays about its centre */
@@ -131,13 +172,39 @@ static int take_newest(const plant *p, transition *t, outcome *found)
     return 1;
 }
 
+/* How far a state whose slope is `own` moves within h at most, where it is moved by `rate` at its own end: v(h) for
+ * v' <= own v + rate and v(0) <= 0, with 1 - exp(-s) between s / (1 + s) and 1 for s = -own h. */
+static double pulled_back(double own, double rate, double h)
+{
+    const double s = -own * h;
+    if (!(s > 0.0)) return INFINITY;
+    return rate > 0.0 ? rate * smaller(h, 1.0 / -own) : rate * (h / (1.0 + s));
+}
+
+/* A state that has no line: anywhere in its bounds at the end of a substep, which began in p->before. */
+static void take_anywhere(const plant *p, double h, integer i, transition *t)
+{
+    const ends at = rates_at_faces(p, i);
+    const double own = row_of(&p->f, i)->g[i], low = p->before.low[i], high = p->before.high[i];
+    const double up = high + pulled_back(own, at.high, h), down = low - pulled_back(own, -at.low, h);
+    const double room_up = 4.0 * ROUNDING * (fabs(high) + fabs(up - high)) + TINIEST;
+    const double room_down = 4.0 * ROUNDING * (fabs(low) + fabs(low - down)) + TINIEST;
+    t->box.high[i] = smaller(up + room_up, smaller(t->box.high[i], p->z.high[i]));
+    t->box.low[i] = larger(down - room_down, larger(t->box.low[i], p->z.low[i]));
+    fill(t->A + i * p->n, 0.0, p->n);
+    fill(t->E + i * p->nw, 0.0, p->nw);
+    t->a[i] = 0.5 * t->box.low[i] + 0.5 * t->box.high[i];
+    t->R[i] = 0.5 * (t->box.high[i] - t->box.low[i]) + 2.0 * ROUNDING * largest_of(t->box, i) + TINIEST;
+}
+
 /* The transition before, `old`, and one more substep over which the state stays in z. */
 static int advance(const plant *p, const transition *old, const local *d, const exponential *e, double h,
                    transition *t, outcome *found)
 {
     const integer n = p->n, nw = p->nw;
     for (integer i = 0; i < n; i++)
-        for (integer j = 0; j < nw; j++) d->gain_w[i * nw + j] = row_of(&p->f, i)->g[n + j] * p->held[j];
+        for (integer j = 0; j < nw; j++)
+            d->gain_w[i * nw + j] = d->steep[i] != 0.0 ? 0.0 : row_of(&p->f, i)->g[n + j] * p->held[j];
     for (integer i = 0; i < n; i++) {
         double *A = t->A + i * n, *E = t->E + i * nw, a = 0.0, R = 0.0, terms = 0.0;
         fill(A, 0.0, n);
@@ -165,6 +232,7 @@ static int advance(const plant *p, const transition *old, const local *d, const 
         t->box.high[i] = old->box.high[i] + h * high + room;
         t->within.low[i] = smaller(old->within.low[i], p->z.low[i]);
         t->within.high[i] = larger(old->within.high[i], p->z.high[i]);
+        if (d->steep[i] != 0.0) take_anywhere(p, h, i, t);
     }
     t->start = old->start, t->substeps = old->substeps + 1;
     return take_newest(p, t, found);
@@ -198,15 +266,16 @@ static int move(plant *p, double T, integer least_substeps, transition *t, trans
     exponential e = exponential_in(&scratch, p->n);
     integer done = 0, size = FINEST / least_substeps;
     transition *now = t, *next = other;
-    outcome why = {.why = MOVES_TOO_FAR};
+    outcome why = {.code = NOT_ENCLOSED};
     stand_still(p, now);
     while (done < FINEST) {
         const double h = T * ((double)size / (double)FINEST); /* exact: a power of two */
         span_copy(p->before, now->box, p->n);
         const int is_enclosed = plant_enclose(p, h, &why);
-        const double norm = is_enclosed ? scaled_norm(p, h, d.drive, &d) : 0.0;
-        if (is_enclosed && norm <= 1.0) {
+        if (is_enclosed) take_slopes(p, h, d.drive, &d);
+        if (is_enclosed && is_short_enough(p, &d, T, size)) {
             if (!is_valid(p, p->z, found)) return 0;
+            const double norm = flatten(p, h, &d);
             take_local(p, &d);
             exponential_take(p->n, d.J, h, d.unit, norm, reach_in_units(p, &d), scratch, &e);
             if (!advance(p, now, &d, &e, h, next, found)) return 0;

@@ -33,7 +33,7 @@ _moved = native.function(
 
 # As in `core/tape/plant.h`.
 _TOO_MANY_SUBSTEPS, _OUTSIDE_VALID, _NOT_PHYSICAL, _TOO_WIDE = range(1, 5)
-_MOVES_TOO_FAR, _NO_BOX = range(2)
+_NO_BOX = 0
 _MOST_SUBSTEPS = 200
 
 
@@ -184,8 +184,6 @@ class PlantKernel:
         return Undecided(self._of_substep(found))
 
     def _of_substep(self, found: _Outcome) -> str:
-        if found.why == _MOVES_TOO_FAR:
-            return "the state moves too far for a linear model"
         if found.why == _NO_BOX:
             return f"no box was found that the state keeps to within {found.time:.3g} s"
         return f"the equation of {self._flow.states[found.row]} is not enclosed, {why_not(found.reason, found.op)}"

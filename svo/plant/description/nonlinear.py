@@ -102,6 +102,8 @@ def _texts(table: Table, key: str) -> dict[str, str]:
     if key not in table:
         raise table.error(key, 'is missing; expected a table of expressions, such as { h = "(Q - a * sqrt(h)) / S" }')
     inner = table.table(key)
+    if not inner.content:
+        raise table.error(key, 'is empty; expected at least one row, such as { h = "(Q - a * sqrt(h)) / S" }')
     return {name: inner.text(name) for name in inner.content}
 
 
@@ -109,6 +111,8 @@ def _bounds(table: Table) -> dict[str, tuple[float, float]]:
     """Of disturbances: a half-width, or [lower, upper]."""
     found = {}
     for name, value in _numbers(table).items():
+        if not isinstance(value, tuple) and value < 0.0:
+            raise table.error(name, f"is {value:g}; expected a half-width that is not negative, or [lower, upper]")
         found[name] = value if isinstance(value, tuple) else (-value, value)
     return found
 

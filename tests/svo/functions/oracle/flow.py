@@ -119,16 +119,22 @@ def _at_faces(start: Span, forms: Forms) -> Span:
     Where f_i falls with x_i, v = x_i - upper_i has v' <= g_ii v + F, F being the form's bound at x_i = upper_i, and
     v <= 0 at first: so v(t) <= t max(F, 0), whatever f_i is at a smaller x_i.
     """
+    at, own = rates_at_faces(start, forms), np.diagonal(forms.g)
+    return Span(
+        np.where(own <= 0.0, np.maximum(at.lower, forms.lower), forms.lower),
+        np.where(own <= 0.0, np.minimum(at.upper, forms.upper), forms.upper),
+    )
+
+
+def rates_at_faces(start: Span, forms: Forms) -> Span:
+    """Bounds of each f_i where x_i is at the ends of ``start``."""
     n, size = len(start.lower), np.abs(forms.g) @ forms.reach
     own, middle = np.diagonal(forms.g), forms.centre[:n]
     others = size - np.abs(own) * forms.reach[:n]
     lost = (forms.g.shape[1] + 8) * _EPS * (size + np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high))
     upper = forms.k + own * (start.upper - middle) + others + forms.high + lost
     lower = forms.k + own * (start.lower - middle) - others + forms.low - lost
-    return Span(
-        np.where(own <= 0.0, np.maximum(lower, forms.lower), forms.lower),
-        np.where(own <= 0.0, np.minimum(upper, forms.upper), forms.upper),
-    )
+    return Span(lower, upper)
 
 
 def _image(start: Span, f: Span, h: float) -> Span:

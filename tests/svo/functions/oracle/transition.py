@@ -2,7 +2,8 @@
 
 Conservative linearisation (Althoff, Stursberg and Buss, CDC 2008) with secants for Jacobians: substep by substep an
 enclosure, linear forms over it, an enclosed exponential, and the remainder carried through the integral of exp(M t),
-M being the slopes with absolute values off the diagonal: |exp(J t)| <= exp(M t) entry by entry.
+M being the slopes with absolute values off the diagonal: |exp(J t)| <= exp(M t) entry by entry. A state that is too
+steep for the last substep short enough has no line in it (`_anywhere`), and is in the remainder of the others.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ from svo.functions.tape import Forms
 from svo.models.nonlinear import NonlinearModel, Span, Undecided
 from svo.models.nonlinear.transition import Transition
 from tests.svo.functions.oracle.exponential import carried, held
-from tests.svo.functions.oracle.flow import Flow
+from tests.svo.functions.oracle.flow import Flow, rates_at_faces
 
 _EPS = float(np.finfo(np.float64).eps)
 _FINEST = 4096  # substeps are multiples of so small a part of the sample
 _MOST = 200  # substeps
+_BEFORE_FLAT = 16  # substeps that states have which no number of substeps would give lines
 _TINY = 2.0**-1000
 _WORTH_ANOTHER = 0.1  # of the width of the set: a remainder beyond it is worth a second substep
 
@@ -34,17 +36,19 @@ def transition(flow: Flow, start: Span, u: Array, T: float, least: int = 1) -> T
     n, nw = flow.n, len(flow.varying)
     start = flow.inside(start)
     here = Transition(np.eye(n), np.zeros(n), np.zeros((n, nw)), np.zeros(n), start, start, 0)
-    done, size, why = 0, _FINEST // least, "the state moves too far for a linear model"
+    done, size, why = 0, _FINEST // least, ""
     while done < _FINEST:
         h = T * (size / _FINEST)  # exact: a power of two
         try:
             box, forms = flow.enclosure(here.box, u, h)
-            is_short = _scaled_norm(forms.g[:, :n], box, h) <= 1.0
+            steep = ~(_scaled_norms(forms.g[:, :n], box, h) <= 1.0)
+            pulls = (np.diagonal(forms.g) * T < -_MOST) & (_FINEST // size >= _BEFORE_FLAT)
+            is_short = bool((~steep | pulls).all()) or _FINEST // size > _MOST
         except Undecided as error:
             is_short, why = False, str(error)
         if is_short:
             flow.check_valid(box)
-            here, done = _after(flow, here, start, box, forms, h), done + size
+            here, done = _after(flow, here, start, box, forms, h, steep), done + size
         elif size == 1 or (_FINEST - done) // size > _MOST:
             raise Undecided(f"more than {_MOST} substeps would be needed: {why}")
         else:
@@ -71,26 +75,32 @@ def mapped(flow: Flow, start: Span, u: Array) -> Transition:
     return found._replace(box=_newest(flow, found, start, found.box))
 
 
-def _scaled_norm(J: Array, box: Span, h: float) -> float:
-    """|D^-1 J D| h, D being powers of two near what the box and J move within h; it decides how short a substep is."""
+def _scaled_norms(J: Array, box: Span, h: float) -> Array:
+    """Row sums of |D^-1 J D| h, D being powers of two near what the box and J move within h.
+
+    They decide how short a substep is.
+    """
     reach = box.width + 1e-12 * box.largest + 1e-100
     moved = 4.0 * h * (np.abs(J) @ reach)
     unit = np.exp2(np.round(np.log2(reach + moved + 2.0 * h * (np.abs(J) @ moved))))
-    return float((np.abs(J) @ unit / unit).max() * h)
+    sums: Array = np.abs(J) @ unit / unit * h
+    return sums
 
 
-def _after(flow: Flow, here: Transition, start: Span, box: Span, forms: Forms, h: float) -> Transition:
+def _after(flow: Flow, here: Transition, start: Span, box: Span, forms: Forms, h: float, steep: Array) -> Transition:
     """One more substep, over which the state stays in ``box``."""
     n, w = flow.n, flow.w
-    J, W = forms.g[:, :n], forms.g[:, n:]
-    kept = np.where(flow.varying, 0.0, 1.0)
-    shift = forms.centre * np.concatenate([np.ones(n), kept])  # what varies stays about its centre
+    lined, kept = np.where(steep, 0.0, 1.0), np.where(flow.varying, 0.0, 1.0)
+    J, W = forms.g[:, :n] * lined * lined[:, None], forms.g[:, n:] * lined[:, None]
+    shift = forms.centre * np.concatenate([lined, kept])  # what varies or is steep stays about its centre
     middle, rest = 0.5 * (forms.low + forms.high), 0.5 * (forms.high - forms.low)
     q = forms.k + middle - forms.g @ shift
     size = np.abs(forms.k) + np.abs(forms.low) + np.abs(forms.high) + np.abs(forms.g) @ np.abs(forms.centre)
     rounding = (n + len(kept) + 8) * _EPS
-    drive = rest + rounding * size + np.abs(W) @ ((1.0 - kept) * w.width * 0.5 * (1.0 + _EPS))
-    step, most = held(J, h), np.abs(W) @ w.largest + size
+    free = np.concatenate([(1.0 - lined) * box.width, (1.0 - kept) * w.width])
+    moving = np.abs(forms.g) @ (free * 0.5 * (1.0 + _EPS))
+    drive, q = lined * (rest + rounding * size + moving), lined * q
+    step, most = held(J, h), np.abs(W) @ w.largest + lined * size
     E = step.gain @ (W * kept)
     lost = carried(J, h) @ drive + step.move_error @ box.largest + step.gain_error @ most
     P = np.abs(step.move)
@@ -110,7 +120,41 @@ def _after(flow: Flow, here: Transition, start: Span, box: Span, forms: Forms, h
     )
     end = Span(here.box.lower + h * forms.lower, here.box.upper + h * forms.upper)
     room = 2.0 * _EPS * (box.largest + h * np.maximum(np.abs(forms.lower), np.abs(forms.upper)))
-    return found._replace(box=_newest(flow, found, start, Span(end.lower - room, end.upper + room)))
+    end = Span(end.lower - room, end.upper + room)
+    if steep.any():
+        found, end = _anywhere(found, steep, _pulled(here.box, box, forms, h, end), end)
+    return found._replace(box=_newest(flow, found, start, end))
+
+
+def _pulled(before: Span, box: Span, forms: Forms, h: float, end: Span) -> Span:
+    """Bounds after h of states that are in ``before`` and do not leave ``box``.
+
+    Over the box v = x_i - upper_i has v' <= g_ii v + F, and v <= 0 at first, so for g_ii < 0 and s = -g_ii h
+    v(h) <= F (1 - exp(-s)) h / s, where 1 - exp(-s) is between s / (1 + s) and min(s, 1).
+    """
+    own, at = np.diagonal(forms.g), rates_at_faces(before, forms)
+    s = np.where(own < 0.0, -own * h, np.nan)
+
+    def moved(rate: Array) -> Array:
+        far = np.where(rate > 0.0, rate * np.minimum(h, h / s), rate * (h / (1.0 + s)))
+        return np.where(own < 0.0, far, np.inf)
+
+    up, down = moved(at.upper), moved(-at.lower)
+    upper = before.upper + up + 4.0 * _EPS * (np.abs(before.upper) + np.abs(up)) + _TINY
+    lower = before.lower - down - 4.0 * _EPS * (np.abs(before.lower) + np.abs(down)) - _TINY
+    lower = np.maximum(np.maximum(lower, end.lower), box.lower)
+    return Span(lower, np.minimum(np.minimum(upper, end.upper), box.upper))
+
+
+def _anywhere(found: Transition, steep: Array, at: Span, end: Span) -> tuple[Transition, Span]:
+    """States that are anywhere in their bounds ``at`` the end of a substep, whatever they were before."""
+    middle = 0.5 * at.lower + 0.5 * at.upper
+    radius = 0.5 * at.width + 2.0 * _EPS * at.largest + _TINY
+    line = np.where(steep, 0.0, 1.0)[:, None]
+    found = found._replace(
+        A=found.A * line, E=found.E * line, a=np.where(steep, middle, found.a), R=np.where(steep, radius, found.R)
+    )
+    return found, Span(np.where(steep, at.lower, end.lower), np.where(steep, at.upper, end.upper))
 
 
 def _newest(flow: Flow, found: Transition, start: Span, known: Span) -> Span:

@@ -162,11 +162,12 @@ def test_an_alarm_of_other_equations_is_not_the_plants(tmp_path: Path, monkeypat
         ("hole = 0.0", "hole = [0.2, 0.0]", "hole is between 0.2 and 0.0; expected lower <= upper"),
         ("hole = 0.0", "hole = [0.2]", r"\[parameters\], key 'hole': has shape \(1,\); expected a number, or"),
         ("physical = [[0.0, 0.0], [60.0, 60.0]]", "", "largest is missing"),
-        ("d2 = 0.002 }", "d2 = -0.002 }", "d2 is between 0.002 and -0.002"),
+        ("d2 = 0.002 }", "d2 = -0.002 }", "key 'd2': is -0.002; expected a half-width that is not neg"),
         ('{ hole = [0.0, 0.2] }', "{ hol = [0.0, 0.2] }", "faults.leak.parameters.*did you mean 'hole'"),
         ('{ hole = [0.0, 0.2] }', "{}", r"\[faults.leak\], key 'parameters': is missing"),
         ('type = "parameter"\nparameters = { h', 'type = "model"\nparameters = { h', "one of parameter, sensor"),
         ("lower = [28.0, 10.0]", "lower = [28.0]", r"\[initial\]"),
+        (re.findall(r"h1 = .*\nh2 = .*\n", TANKS)[0], "", r"key 'dynamics': is empty; expected at least one row"),
         ('h1 = "(pump', 'h3 = "(pump', r"unknown symbol 'h1'"),
     ],
 )  # fmt: skip
