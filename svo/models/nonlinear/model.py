@@ -396,7 +396,7 @@ class NonlinearModel(Value, Shown):
             For a wrong shape, NaN or Inf, or if the run leaves the range where the equations have values.
         """
         inputs = finite_array("u", u, ("samples", self.n_inputs))
-        x: Array = finite_array("x0", x0, (len(self.states),), (self.n_states,))
+        x: Array = finite_array("x0", x0, *dict.fromkeys([(len(self.states),), (self.n_states,)]))
         expect_shape(len(inputs), "u", inputs, f"(samples, {self.n_inputs}), at least one sample")
         expect_kind("rng", rng, np.random.Generator, "a numpy Generator, such as np.random.default_rng(0)")
         expect(is_count(substeps, 1), "substeps", substeps, "a number of steps >= 1")

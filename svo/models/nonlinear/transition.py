@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from polytopes.shown import brief, in_a_line
 from svo.checks import Array
 from svo.models.nonlinear.flow import Span
 
@@ -26,3 +27,6 @@ class Transition(NamedTuple):
     box: Span
     within: Span
     substeps: int
+
+    def __repr__(self) -> str:
+        return in_a_line(f"Transition({', '.join(f'{name}={brief(value)}' for name, value in self._asdict().items())})")

@@ -232,3 +232,10 @@ def test_a_step_that_is_too_long_is_undecided() -> None:
     model.transition([1.0], [1.1], dt=0.5)
     with pytest.raises(Undecided, match="more than 200 substeps would be needed"):
         model.transition([1.0], [1.1], dt=1.5)  # at 1 / 1.1 it is infinite
+
+
+def test_a_transition_shows_itself_in_a_line() -> None:
+    case = three_tanks()
+    shown = repr(case.model.transition(case.x0 - 1.0, case.x0 + 1.0, case.u(0)))
+    assert shown.startswith("Transition(A=array (3, 3), a=[")
+    assert len(shown) < 400
