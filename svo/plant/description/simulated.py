@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polytopes import HPolytope
 from polytopes.shown import Shown, in_a_line
-from svo.baselines.linear_gaussian import GaussianModel
 from svo.checks import Array, expect
-from svo.detectors.detector import Detector
-from svo.detectors.standard import KalmanChiSquare
-from svo.detectors.window_bank import WindowBank
 from svo.faults import Ramp, SensorFault, Step, simulate_fault
 from svo.faults.equations import rewritten, with_inputs
 from svo.functions.expression import Recorder
@@ -31,6 +27,9 @@ from svo.plant.description.faults import FaultModel
 from svo.plant.description.plant import TOP, DescribedPlant, read_description
 from svo.plant.description.table import Table, read_table
 from svo.plant.protocol import HEALTHY, Distribution, Reference, StatedFault
+
+if TYPE_CHECKING:
+    from svo.detectors.detector import Detector
 
 _KEYS = ("duration", "fault_time", "soft", "inputs")
 _SUBSTEPS = 10
@@ -195,6 +194,10 @@ class SimulatedPlant(Shown):
 
         Whatever the ``noise`` set.
         """
+        from svo.baselines.linear_gaussian import GaussianModel  # imported here: detection compares nothing
+        from svo.detectors.standard import KalmanChiSquare
+        from svo.detectors.window_bank import WindowBank
+
         faults = {name: fault.model for name, fault in self.described.faults.items() if fault.contains_nominal}
         models: dict[str, Any] = {"nominal": self.model, **faults}
         bank = WindowBank(models, self.described.initial, self.described.observer.horizon, stated=True)
