@@ -39,10 +39,10 @@ def test_sets_verdicts_and_linearisations_hold_the_truth(name: str, batch: int) 
     assert found["count"]["outputs"] == 24
 
 
-def test_a_runaway_is_undecided_and_counted_apart() -> None:
+def test_a_runaway_is_counted_apart_and_decided() -> None:
     found = examine("ignition", 1, runs=4, samples=40)["count"]
     assert found["runaway"] > 20
-    assert found["undecided in a runaway"] > 0
+    assert not found.get("undecided in a runaway")
     assert not refuted(found)
     assert not found.get("undecided in normal operation")
 
