@@ -13,7 +13,6 @@
 
 enum { UNPROVEN = -1, TOO_MANY_RAYS = -2 };
 
-static const double NEAR = 1e-3;       /* of the unit matrix that an inverse may miss */
 enum { STEPS = 4 };
 static const double DEPENDENT = 1e-13; /* pivot, of rows of length about one */
 
@@ -134,8 +133,8 @@ static int proven(Cone *cone, const integer *rows, const double *ray)
         largest = larger(largest, rounded);
     }
     for (integer l = 0; l < d; l++) off = larger(off, cone->total[l]);
-    if (!(off < NEAR)) return 0;
-    const double z = missed / (1.0 - 2.0 * off);
+    if (!(off < 0.5)) return 0;
+    const double z = 2.5 * missed; /* 1 / (1 - |F|) is at most 2, up to what is rounded in it */
     for (integer i = 0; i < m; i++) cone->factor[i] = 1.0 / last[i], cone->shut[i] = 0.0;
     for (integer l = 0; l < d - 1; l++) {
         cone->factor[rows[l]] = 0.0, cone->shut[rows[l]] = -HUGE_VAL;

@@ -186,7 +186,9 @@ static secant of_wave(fdi_interval a, fdi_interval values, double m, fdi_interva
 
 /* Where an interval is so wide that sin or cos bends both ways: bounds of second order on each of its pieces. */
 enum { MOST_PIECES = 32 };
-static const double PIECE = 0.25, BENDS_BOTH_WAYS = 0.5, FAR = 0x1p30;
+static const double PIECE = 0.25;          /* width of a piece, at most */
+static const double BENDS_BOTH_WAYS = 0.5; /* width below which one piece does */
+static const double FAR = 0x1p30;          /* from where on centres of pieces are too coarse to pay */
 
 typedef struct {
     ends e; /* first, so that a pointer to it is one to all */
