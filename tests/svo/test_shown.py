@@ -79,6 +79,7 @@ FLAT = sorted(
     if is_dataclass(kind) and not inspect.isabstract(kind) and kind.__repr__ is Shown.__repr__
 )
 MACHINERY = {
+    "polytopes.distance.Distance",  # a float
     "svo.isolation.recorder.Outcome",
     "svo.isolation.recorder.Recorder",
     "svo.testing.plant_runs.PlantRuns",

@@ -6,11 +6,11 @@ import ast
 import gzip
 import importlib.util
 import json
+import os
 import sys
 from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -411,14 +411,20 @@ def bombs(steps: list[Any]) -> dict[str, bytes]:
     }
 
 
+def children_seconds() -> float:
+    """What processes that have ended took of the processor."""
+    used = os.times()
+    return used.children_user + used.children_system
+
+
 def test_bombs_end_soon_with_one_line(case: tuple[Files, int], tmp_path: Path) -> None:
     (proof, plant, log), _ = case
     for name, content in bombs(steps_of(proof)).items():
         path = tmp_path / "bomb.jsonl.gz"
         path.write_bytes(content)
-        begun = perf_counter()
+        begun = children_seconds()
         assert claims((path, plant, log)) == [], name
-        assert perf_counter() - begun < 3.0, name  # one, on a machine that is not busy
+        assert children_seconds() - begun < 3.0, name  # of the processor, the start of Python in it; else one
 
 
 def test_what_cannot_be_written_is_refused_with_its_reason(tmp_path: Path) -> None:

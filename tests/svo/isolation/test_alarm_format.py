@@ -9,7 +9,7 @@ import sys
 import zlib
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -303,11 +303,11 @@ def test_bombs_end_soon_with_one_error(tmp_path: Path, scheduled: Scheduled) -> 
     for name, content in bombs(alarm).items():
         path = tmp_path / "bomb.jsonl"
         path.write_bytes(content)
-        begun = perf_counter()
+        begun = process_time()
         answer = answer_of(path)
         assert not answer.startswith("proven"), name
         assert len(answer) < 400, name
-        assert perf_counter() - begun < 2.0, name  # one, on a machine that is not busy
+        assert process_time() - begun < 2.0, name  # of the processor; one, if nothing else keeps it busy
 
 
 @pytest.mark.slow

@@ -50,11 +50,13 @@ def normal_proof(c: WindowCertificate) -> list[np.ndarray]:
     x, u, y, w = (getattr(c.units, f.name) for f in fields(c.units))
     a, found = c.arrival, [c.delta, c.owner, np.ldexp(c.w_rows, w), c.w_rows_lower, c.w_rows_upper, c.on_arrival]
     found += [np.ldexp(a.box_lower, -x), np.ldexp(a.box_upper, -x), np.ldexp(a.rows, x), a.lower, a.upper]
-    shift = {"u": -u, "y": -y, "noise": -y, "slack": -y, "w_lower": -w, "w_upper": -w, "on_output": y}
+    inputs = np.concatenate([x, u, [0], w])
+    shift = {"gain": -np.concatenate([x, y]), "functional": inputs, "remainder": -y}
+    shift |= {"u": -u, "y": -y, "noise": -y, "slack": -y, "w_lower": -w, "w_upper": -w, "on_output": y}
     for s in c.samples:
         found.append(s.stack * c.units.factor)
         for f in fields(WindowSample):
-            if f.name != "stack":
+            if f.name != "stack" and getattr(s, f.name) is not None:
                 found.append(np.ldexp(getattr(s, f.name), shift.get(f.name, 0)))
     return found
 

@@ -128,11 +128,11 @@ def test_faults_of_actuators_of_the_plant_and_of_equations(tmp_path: Path) -> No
     assert extra["siphon"] == ["siphon"]
     assert len(plant.bank("stated").observers) == 6
     for old, new, why in (
-        ('magnitude = 0.5', 'magnitude = 1.5', r"\[faults.pump\]: magnitude is 1.5; expected the lost fraction"),
-        ('a = [0.01, 0.0]', 'a = [0.01]', r"\[faults.rain\]: a of the direction has shape \(1,\); expected \(2,\)"),
-        ('(outlet + siphon)', '(outlet + sifon)', r"\[faults.siphon\]: f, row h2: unknown symbol 'sifon'.*'siphon'"),
+        ("magnitude = 0.5", "magnitude = 1.5", r"\[faults.pump\]: magnitude is 1.5; expected the lost fraction"),
+        ("a = [0.01, 0.0]", "a = [0.01]", r"\[faults.rain\]: a of the direction has shape \(1,\); expected \(2,\)"),
+        ("(outlet + siphon)", "(outlet + sifon)", r"\[faults.siphon\]: f, row h2: unknown symbol 'sifon'.*'siphon'"),
         ('{ h2 = "(pipe', '{ h3 = "(pipe', r"\[faults.siphon\]: f has a row for 'h3'"),
-        ('contains_nominal = true', 'contains_nominal = false', "its observer needs a set to start from"),
+        ("contains_nominal = true", "contains_nominal = false", "its observer needs a set to start from"),
     ):
         with pytest.raises(ValueError, match=why):
             described(tmp_path, "[faults.leak]", text.replace(old, new) + "[faults.leak]")
