@@ -17,10 +17,10 @@ export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test test-slow test-browser test-packaging bench docs lint clean
 
-# The isolation-time study of the Eclipse with both noise sets, then a check of every alarm's proof.
+# The isolation-time study of the Eclipse, both banks, then a check of every alarm's proof.
 demo: $(VENV)/.study $(VENV)/.library
 	rm -rf $(STUDY)
-	$(BIN)/svo study eclipse --runs 10 --seed 0 --noise quiet --noise conservative --out $(STUDY)
+	$(BIN)/svo study eclipse --runs 2 --seed 0 --noise quiet --models nonlinear --models lpv --out $(STUDY)
 	$(BIN)/svo verify $(STUDY)/alarms.jsonl.gz
 	@echo "Open $(STUDY)/report.html in a browser; everything else is beside it."
 

@@ -103,10 +103,10 @@ class Eclipse(Shown):
     scenarios: Scenarios = field(default_factory=Scenarios)
     horizon: int = 10
     architecture: Literal["I", "II"] = "I"
-    model_kind: Literal["lpv", "nonlinear"] = "lpv"
+    model_kind: Literal["lpv", "nonlinear"] = "nonlinear"
     bounds: Mapping[str, Mapping[str, MismatchBounds]] = field(default_factory=read_bounds, repr=False)
     architectures: tuple[str, ...] = ("I", "II")
-    model_kinds: tuple[str, ...] = ("lpv", "nonlinear")
+    model_kinds: tuple[str, ...] = ("nonlinear", "lpv")
     name: str = "eclipse"
     title: str = "Eclipse UAV, longitudinal axis: alpha sensor, elevator and M_u faults"
     Ts: float = TS

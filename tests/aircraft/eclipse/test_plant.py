@@ -135,6 +135,7 @@ def test_the_bank_of_the_other_architecture_starts_its_fault_observers_at_the_de
 def test_the_bank_of_the_simulators_equations_sees_the_same_flight_without_a_schedule():
     linear, exact = (with_bank(PLANT, BankChoice(models=kind)) for kind in ("lpv", "nonlinear"))
     assert (bank_choice(linear), bank_choice(exact)) == (BankChoice("I", "lpv"), BankChoice("I", "nonlinear"))
+    assert bank_choice(PLANT) == bank_choice(exact)
     log = exact.simulate("elevator", "step", "quiet", 11)
     np.testing.assert_array_equal(log.y, linear.simulate("elevator", "step", "quiet", 11).y)
     assert log.schedule is None

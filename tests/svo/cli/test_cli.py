@@ -350,7 +350,7 @@ def test_a_plant_with_one_bank_has_no_architectures(log: Path, tmp_path: Path) -
     unknown = svo("study", "eclipse", "--architecture", "III", "--out", tmp_path / "study")
     assert "plant 'eclipse' has no architecture 'III'; it has I, II" in one_line(unknown)
     unknown = svo("detect", "eclipse", log, "--models", "cubic")
-    assert "plant 'eclipse' has no kind of models 'cubic'; it has lpv, nonlinear" in one_line(unknown)
+    assert "plant 'eclipse' has no kind of models 'cubic'; it has nonlinear, lpv" in one_line(unknown)
 
 
 def test_both_architectures_see_the_same_runs_side_by_side(registered_tank: str, tmp_path: Path) -> None:
