@@ -13,7 +13,7 @@ from svo.checks import Array
 from svo.functions import sin, sqrt
 from svo.logs.drive import drive
 from svo.models.nonlinear import NonlinearModel
-from tests.svo.models.nonlinear_plants import CASES, Case, crane, cstr, pendulum
+from tests.svo.models.nonlinear_plants import CASES, Case, crane, pendulum
 
 SEED = 20_261_203
 
@@ -118,11 +118,15 @@ def test_a_linear_plant_is_told_apart_as_its_linear_model_is() -> None:
 
 
 def test_a_tube_that_grows_beyond_what_is_enclosed_says_how_far_it_was() -> None:
-    case = cstr()
-    faulty = case.model.replace(w=[0.005, 0.6])
-    found = distinguishability(faulty, case.model, 30, initial=first(case), u=case.inputs(30))
+    """Of x' = x^2, which from .6 on is infinite after 17 samples."""
+    model = NonlinearModel(
+        lambda x, w: [x[0] * x[0] + w[0]], lambda x: [x[0]], states=["x"], disturbances=["w"], w=[0.001], Ts=0.1,
+        n=[0.1], largest=([-1e3], [1e3]),
+    )  # fmt: skip
+    u, start = np.zeros((30, 0)), HPolytope.box([0.5], [0.6])
+    found = distinguishability(model.replace(w=[0.002]), model, 30, initial=start, u=u)
     assert found.horizon is None
-    assert found.searched < 30
+    assert 5 < found.searched < 17
 
 
 @pytest.mark.parametrize(("name", "horizon", "limit"), [("pendulum", 8, 10.0), ("servo", 6, 0.4)])

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -263,11 +264,12 @@ def test_a_description_where_a_plant_must_be_simulated_is_one_line(
     registered_tank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    assert one_line(svo(*command)) == "error: cart.toml: No such file or directory"
+    shutil.copy(Path(__file__).parents[3] / "docs" / "examples" / "cart.toml", tmp_path / "cart.toml")
     message = one_line(svo(*command))
-    assert message.startswith("error: cart.toml: a TOML file describes a model for logs")
-    assert "expected a registered one: eclipse, elevator, missile, tank" in message
-    assert "svo detect, svo watch or svo calibrate" in message
-    assert not list(tmp_path.iterdir())
+    assert message.startswith("error: cart.toml: describes a linear model for logs")
+    assert "equations ([model.dynamics]) and [simulation], or a plant registered in Python" in message
+    assert [path.name for path in tmp_path.iterdir()] == ["cart.toml"]
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf"])

@@ -134,7 +134,7 @@ def test_wrong_arguments_are_named(registered):
 
 
 def test_a_plant_without_detectors_is_refused(monkeypatch):
-    monkeypatch.setattr(module, "load_plant", lambda name: object())
+    monkeypatch.setattr(module, "plant_to_simulate", lambda name: object())
     module.compared_plant.cache_clear()
     with pytest.raises(TypeError, match="offers no detectors to compare"):
         module.compared_plant("bare")
