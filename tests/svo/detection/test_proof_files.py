@@ -103,7 +103,9 @@ def test_the_commands_write_what_the_checker_takes(tmp_path: Path) -> None:
 
 
 def test_a_scheduled_plant_is_described_with_its_log(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["describe", "eclipse", "--noise", "quiet", "--out", str(tmp_path / "plant.json")])
+    done = CliRunner().invoke(
+        app, ["describe", "eclipse", "--models", "lpv", "--noise", "quiet", "--out", str(tmp_path / "plant.json")]
+    )
     assert done.exit_code == 1
     assert "scheduled" in done.output
     assert "give the log" in done.output
@@ -111,7 +113,7 @@ def test_a_scheduled_plant_is_described_with_its_log(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_eclipse_is_proven(tmp_path: Path) -> None:
-    plant = find_plant("eclipse")
+    plant = find_plant("eclipse", models="lpv")
     for seed, fault in ((3, "elevator"), (4, "alpha"), (5, "dynamics")):
         (tmp_path / fault).mkdir()
         log = plant.simulate(fault, "soft", "quiet", seed)
