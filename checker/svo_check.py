@@ -142,7 +142,7 @@ class Log:
             lines.pop()  # a line without its end is no sample
         header, *rows = [row for row in csv.reader(lines) if row]
         groups = [[columns["time"]], columns["inputs"], columns["outputs"]]
-        expect(all(header.count(name) == 1 for group in groups for name in group), "the log lacks columns of the model")
+        expect(all(header.count(name) == 1 for g in groups for name in g), f"expected one column each of {groups}")
         table = [[[float(row[header.index(c)].strip() or "nan") for c in group] for group in groups] for row in rows]
         self.time, self.u, self.y = [t for (t,), _, _ in table], [u for _, u, _ in table], [y for _, _, y in table]
 
@@ -473,15 +473,15 @@ def main():
         parser.add_argument(name, **needed)
     given, begun = parser.parse_args(), time.process_time()
     try:
-        plant = json.loads(Path(given.model).read_text(encoding="utf-8"))
+        plant = json.loads(Path(at := given.model).read_text(encoding="utf-8"))
         expect(plant.get("format") == "svo-plant-1", "the model is not of the format svo-plant-1")
-        log = Log(given.log, plant["columns"])
+        log = Log(at := given.log, plant["columns"])
         expect(plant["samples"] in (None, len(log.time)), "the model's scheduling values are of another log")
-        found = check(given.proof, plant, log)
+        found = check(at := given.proof, plant, log)
         log.check_times(real(plant["Ts"]), max(sample for _, sample, _ in found))
     except REFUSALS as error:
         why = str(error) if isinstance(error, Wrong) else f"not of the format ({type(error).__name__}: {error})"
-        print(f"NOT PROVEN: {why:.250}")
+        print(f"NOT PROVEN: {at}: {why:.250}")
         return 1
     for observer, sample, chain in found:
         print(f"PROVEN: {observer!r} is falsified at sample {sample} ({log.time[sample]:g} s); {chain.checked} steps")

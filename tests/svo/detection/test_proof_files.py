@@ -123,6 +123,21 @@ def test_the_eclipse_is_proven(tmp_path: Path) -> None:
         assert code == 0, text
 
 
+def test_a_file_that_is_another_is_named(case: tuple[Files, int], tmp_path: Path) -> None:
+    (proof, plant, log), _ = case
+    (other := tmp_path / "other.csv").write_text("time_s,y\n0,1\n")
+    for files, word in (
+        ((other, plant, log), other),
+        ((proof, other, log), other),
+        ((proof, plant, other), "one column each"),
+    ):
+        code, text = answer(*files)
+        assert code == 1
+        assert text.startswith("NOT PROVEN: ")
+        assert str(word) in text
+        assert len(text.splitlines()) == 1
+
+
 # -- what is refused --------------------------------------------------------------------------------------------------
 
 
