@@ -65,26 +65,23 @@ void settle(const Rows *rows, State *at)
         if (at->W[k] >= 0) at->s[at->W[k]] = 0.0;
 }
 
-/* Gauss-Jordan with partial pivoting on [active rows, I]. */
-int invert_basis(const Rows *rows, const integer *W, double *Q, double *work)
+/* Q (d, d) = the transposed inverse of the rows (d,) in the left half of work (d, 2 d), by Gauss-Jordan with partial
+ * pivoting. 0 if a pivot is not above the least one. */
+int invert(double *work, integer d, double least, double *Q)
 {
-    const integer d = rows->d, width = 2 * d;
+    const integer width = 2 * d;
     for (integer k = 0; k < d; k++)
-        for (integer j = 0; j < d; j++) {
-            work[k * width + j] = W[k] >= 0 ? rows->at[j * rows->stride + W[k]] : (j == -1 - W[k] ? 1.0 : 0.0);
-            work[k * width + d + j] = j == k ? 1.0 : 0.0;
-        }
+        for (integer j = 0; j < d; j++) work[k * width + d + j] = j == k ? 1.0 : 0.0;
     for (integer c = 0; c < d; c++) {
         integer best = c;
         for (integer k = c + 1; k < d; k++)
             if (fabs(work[k * width + c]) > fabs(work[best * width + c])) best = k;
-        if (fabs(work[best * width + c]) < RAY) return 0;
         double *pivot = work + c * width, *other = work + best * width;
-        if (best != c)
-            for (integer j = 0; j < width; j++) {
-                const double kept = pivot[j];
-                pivot[j] = other[j], other[j] = kept;
-            }
+        if (!(fabs(other[c]) > least)) return 0;
+        for (integer j = c; best != c && j < width; j++) {
+            const double kept = pivot[j];
+            pivot[j] = other[j], other[j] = kept;
+        }
         const double inverse = 1.0 / pivot[c];
         for (integer j = c; j < width; j++) pivot[j] *= inverse;
         for (integer k = 0; k < d; k++) {
@@ -95,6 +92,15 @@ int invert_basis(const Rows *rows, const integer *W, double *Q, double *work)
     for (integer j = 0; j < d; j++)
         for (integer k = 0; k < d; k++) Q[k * d + j] = work[j * width + d + k];
     return 1;
+}
+
+int invert_basis(const Rows *rows, const integer *W, double *Q, double *work)
+{
+    const integer d = rows->d;
+    for (integer k = 0; k < d; k++)
+        for (integer j = 0; j < d; j++)
+            work[k * 2 * d + j] = W[k] >= 0 ? rows->at[j * rows->stride + W[k]] : (j == -1 - W[k] ? 1.0 : 0.0);
+    return invert(work, d, RAY, Q);
 }
 
 void coordinates(const Rows *rows, integer i, const double *Q, double *alpha)

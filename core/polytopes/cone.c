@@ -73,36 +73,14 @@ static void to_unit_length(double *y, integer d)
     for (integer j = 0; j < d; j++) y[j] *= inverse;
 }
 
-/* Gauss-Jordan with partial pivoting: the inverse of the rows of a ray and of the ray itself. 0 if there is none. */
-static int invert(const Cone *cone, const integer *rows, const double *ray)
+/* The inverse of the rows of a ray and of the ray itself. 0 if there is none. */
+static int invert_ray(const Cone *cone, const integer *rows, const double *ray)
 {
-    const integer d = cone->d, width = 2 * d;
-    double *work = cone->work;
-    fill(work, 0.0, d * width);
-    for (integer k = 0; k < d; k++) {
-        for (integer j = 0; j < d; j++) work[k * width + j] = k < d - 1 ? cone->at[j * cone->m + rows[k]] : ray[j];
-        work[k * width + d + k] = 1.0;
-    }
-    for (integer c = 0; c < d; c++) {
-        integer best = c;
-        for (integer k = c + 1; k < d; k++)
-            if (fabs(work[k * width + c]) > fabs(work[best * width + c])) best = k;
-        double *pivot = work + c * width, *other = work + best * width;
-        if (!(fabs(other[c]) > DEPENDENT)) return 0;
-        for (integer j = c; best != c && j < width; j++) {
-            const double kept = pivot[j];
-            pivot[j] = other[j], other[j] = kept;
-        }
-        const double inverse = 1.0 / pivot[c];
-        for (integer j = c; j < width; j++) pivot[j] *= inverse;
-        for (integer k = 0; k < d; k++) {
-            const double factor = work[k * width + c];
-            if (k != c && factor != 0.0) add_multiple(work + k * width + c, -factor, pivot + c, width - c);
-        }
-    }
-    for (integer j = 0; j < d; j++)
-        for (integer k = 0; k < d; k++) cone->inverse[k * d + j] = work[j * width + d + k];
-    return 1;
+    const integer d = cone->d;
+    for (integer k = 0; k < d; k++)
+        for (integer j = 0; j < d; j++)
+            cone->work[k * 2 * d + j] = k < d - 1 ? cone->at[j * cone->m + rows[k]] : ray[j];
+    return invert(cone->work, d, DEPENDENT, cone->inverse);
 }
 
 /* Whether the exact ray on d - 1 rows is negative on all others; leaves what the ratio test needs.
@@ -282,7 +260,7 @@ EXPORTED integer fdi_cone_rays(integer d, integer m, const double *at, const dou
         const integer *rows = active + r * n;
         double *ray = rays + r * d;
         if (bounded && rows[n - 1] == m - 1) return UNPROVEN;
-        if (!invert(&cone, rows, ray) || !proven(&cone, rows, ray)) return UNPROVEN;
+        if (!invert_ray(&cone, rows, ray) || !proven(&cone, rows, ray)) return UNPROVEN;
         for (integer k = 0; k < n; k++) {
             double ratio;
             const integer added = end_of_edge(&cone, cone.column + k * m, &ratio);

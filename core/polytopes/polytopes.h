@@ -52,6 +52,7 @@ void lay_out_state(State *at, Memory *memory, integer d, integer m);
 void combine(const Rows *rows, const double *p, double *rate);                  /* rate = A p */
 void slacks(const Rows *rows, const double *x, double *s);                      /* s = b - A x */
 void settle(const Rows *rows, State *at);                                       /* x onto its active rows, s */
+int invert(double *work, integer d, double least, double *Q);                     /* 0 if singular */
 int invert_basis(const Rows *rows, const integer *W, double *Q, double *work);  /* 0 if singular */
 void coordinates(const Rows *rows, integer i, const double *Q, double *alpha);  /* row i over the active rows */
 void exchange(double *Q, const double *alpha, integer slot, integer d);         /* that row takes a slot */
