@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
 from polytopes.shown import Shown, counted
@@ -19,6 +19,7 @@ from svo.functions.operations import Op
 from svo.functions.tape import Tape
 from svo.logs.log import Log
 from svo.models.draws import draw
+from svo.models.nonlinear.arguments import bounds_of, kept_of, names_of, varying_of
 from svo.models.nonlinear.carrier import carrier_of
 from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput, check_output
@@ -122,12 +123,12 @@ class NonlinearModel(Value, Shown):
     def __post_init__(self) -> None:
         put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
         for what in ("states", "inputs", "disturbances"):
-            put(what, _names(what, getattr(self, what)))
+            put(what, names_of(what, getattr(self, what)))
         if not self.states:
             raise ValueError("states is empty; expected at least one name, one a row of f")
         put("Ts", positive_number("Ts", self.Ts, "sampling time in seconds"))
         expect_kind("continuous", self.continuous, bool, "True or False")
-        span = _bounds(self.w, self.disturbances, self.parameters)
+        span = bounds_of(self.w, self.disturbances, self.parameters)
         all_names = [*self.states, *self.inputs, *self.disturbances, *self.parameters]
         twice = next((name for name in all_names if all_names.count(name) > 1), None)
         if twice is not None:
@@ -137,7 +138,7 @@ class NonlinearModel(Value, Shown):
         symbols, n = self.symbols, len(self.states)
         low, high = (end[len(self.disturbances) :] for end in span)
         fixed = np.where(low == high, low, np.nan)
-        put("kept", _kept(self.constant, list(self.parameters), low < high))
+        put("kept", kept_of(self.constant, list(self.parameters), low < high))
         put("free", tuple(name for name in self.parameters if name not in self.kept))
         is_kept = np.isin([*self.disturbances, *self.parameters], self.kept)
         span, known = Span(*(end[~is_kept] for end in span)), Span(*(end[is_kept] for end in span))
@@ -155,10 +156,10 @@ class NonlinearModel(Value, Shown):
             put("valid_range", beside(self.valid_range, known, n))
         own = traced("f", self.f, symbols, fixed, self.states, self.kept)
         tape = with_kept(own, n, len(self.kept), self.continuous)
-        varies = _varying(self.varying, self.disturbances, self.free)
+        varies = varying_of(self.varying, self.disturbances, self.free)
         put("flow", Flow(tape, span, varies, (*self.states, *self.kept), self.physical_range, self.valid_range))
         written = tuple(self.h) if isinstance(self.h, Mapping) else None
-        outputs = written if self.outputs is None else _names("outputs", self.outputs)
+        outputs = written if self.outputs is None else names_of("outputs", self.outputs)
         put("reading", traced("h", self.h, symbols, fixed, outputs, self.kept))
         ny = len(self.reading.outputs)
         if ny == 0:
@@ -410,58 +411,3 @@ class NonlinearModel(Value, Shown):
 
 def _ends(of: StateRange | None) -> tuple[Array, Array] | None:
     return None if of is None else (of.lower, of.upper)
-
-
-def _names(what: str, given: Any) -> tuple[str, ...]:
-    is_list = isinstance(given, Sequence) and not isinstance(given, str)
-    if not is_list or not all(isinstance(name, str) for name in given):
-        raise TypeError(f"{what} is {given!r:.80}; expected a list of names")
-    return tuple(given)
-
-
-def _bounds(w: Any, disturbances: Sequence[str], parameters: Any) -> Span:
-    """Bounds of disturbances, then parameters."""
-    nw = len(disturbances)
-    if w is None:
-        expect(nw == 0, "w", w, f"bounds of the {nw} disturbances: (lower, upper), or a half-width vector ({nw},)")
-        w = np.zeros(0)
-    if isinstance(w, tuple) and len(w) == 2:
-        lower, upper = (finite_array(f"w[{i}]", end, (nw,)) for i, end in enumerate(w))
-    else:
-        upper = sizes("w", w, nw)
-        lower = -upper
-    expect_kind("parameters", parameters, Mapping, "a mapping from names to (lower, upper)")
-    _names("parameters", list(parameters))
-    given = {name: (ends, ends) if np.ndim(ends) == 0 else ends for name, ends in parameters.items()}
-    ends = [finite_array(f"parameters[{name!r}]", end, (2,)) for name, end in given.items()]
-    p = np.array(ends, dtype=float).reshape(-1, 2)
-    span = Span(np.concatenate([lower, p[:, 0]]), np.concatenate([upper, p[:, 1]]))
-    names = [*disturbances, *parameters]
-    for name, low, high in zip(names, *span, strict=True):
-        if low > high:
-            raise ValueError(f"{name} is between {low} and {high}; expected lower <= upper")
-    return span
-
-
-def _kept(constant: Any, parameters: Sequence[str], is_range: NDArray[np.bool_]) -> tuple[str, ...]:
-    """The parameters that are constant and not known."""
-    expect_kind("constant", constant, (bool, str, Sequence), "True, a name of a parameter, or a list of names")
-    chosen = ([*parameters] if constant else []) if isinstance(constant, bool) else constant
-    names = _names("constant", [chosen] if isinstance(chosen, str) else chosen)
-    for name in names:
-        known = f"any of the parameters {', '.join(parameters)}" if parameters else "nothing, there is no parameter"
-        expect(name in parameters, "constant", name, known)
-    return tuple(name for name, free in zip(parameters, is_range, strict=True) if free and name in names)
-
-
-def _varying(varying: Any, disturbances: Sequence[str], parameters: Sequence[str]) -> NDArray[np.bool_]:
-    expect_kind("varying", varying, (str, Sequence), "a name, or a list of names")
-    chosen = [varying] if isinstance(varying, str) else list(varying)
-    groups = {"all": [*disturbances, *parameters], "w": disturbances, "p": parameters}
-    names = {name: [name] for name in groups["all"]}
-    known = groups | names  # a name of a disturbance or a parameter comes before that of a group
-    for name in chosen:
-        if name not in known:
-            raise ValueError(f"varying names {name!r}; expected any of {', '.join(known)}")
-    moves = {member for name in chosen for member in known[name]}
-    return np.array([name in moves for name in groups["all"]], dtype=bool)

@@ -122,26 +122,6 @@ def test_a_remainder_shrinks_with_the_set(case: Case) -> None:
     assert (sizes[1] < sizes[0]).all()
 
 
-def test_units_that_are_powers_of_two_scale_a_transition() -> None:
-    """Levels in 2^-20 cm, flows and seconds as they were."""
-    unit = 2.0**20
-
-    def scaled(h, u, w):
-        return [row * unit for row in plain.f([v / unit for v in h], u, [v / unit for v in w])]
-
-    plain = three_tanks().model
-    other = NonlinearModel(
-        scaled, lambda h: h, states=plain.states, inputs=plain.inputs, disturbances=plain.disturbances, Ts=5.0,
-        n=0.2 * unit, w=[0.003 * unit] * 3, physical=([0] * 3, [62 * unit] * 3),
-    )  # fmt: skip
-    lower, upper = np.array([20.0, 18.0, 19.0]), np.array([20.5, 18.25, 20.25])
-    one = plain.transition(lower, upper, [30.0, 20.0])
-    two = other.transition(lower * unit, upper * unit, [30.0, 20.0])
-    assert two.R / unit == pytest.approx(one.R, rel=1e-9)
-    assert two.a / unit == pytest.approx(one.a, rel=1e-12)
-    assert np.abs(two.A - one.A).max() < 1e-12
-
-
 def test_a_state_that_is_pulled_back_is_enclosed_by_its_own_ends() -> None:
     """A stiff reaction: nothing leaves [0, 1], though |f| is up to 31 there."""
     model = NonlinearModel(
