@@ -27,7 +27,7 @@ from benchmarks._observers import console, table
 from benchmarks.nonlinear import stored
 from svo.checks import Array
 from svo.indices import judge_alarm
-from svo.isolation import Outcome
+from svo.isolation import NOMINAL, Outcome
 from svo.logs.log import Log
 from svo.plant import HEALTHY, first_faulty_sample
 from svo.plant.scheduling import scheduled
@@ -74,6 +74,7 @@ def examine(flight: Flight) -> Found:
         delays = [judge_alarm(at, first, plant.Ts).delay for at in (outcome.detected_at, rightly)]
         found[kind] = {"delays": delays, "isolated as": outcome.fault, "seconds": seconds}
         found[kind] |= {"falsified": sum(_fell(outcome, name, _holds(name, flight, log, first)) for name in bank.names)}
+        found[kind] |= {"false alarm": _fell(outcome, NOMINAL, first)}
         if boxes is not None:
             of_boxes = (_outside(box, log, _holds(name, flight, log, first)) for name, box in boxes.items())
             counts = np.sum(list(of_boxes), axis=0).tolist()
@@ -178,13 +179,14 @@ def _median(delays: list[float | None]) -> float:
 
 
 def _print_manoeuvres(runs: list[Found]) -> None:
-    """Print in how many flights with manoeuvres a bank falsifies a model that holds, if there are any."""
+    """Print in how many flights with manoeuvres a bank alarms before the fault, and falsifies a model that holds."""
     rows = []
     for case, group in groupby(runs, key=lambda run: (run["noise"], run["fault"])):
         flown = list(group)
-        fell = [sum(run[kind]["falsified"] > 0 for run in flown) for kind in PLANTS]
+        fell = [sum(run[kind][what] > 0 for run in flown) for kind in PLANTS for what in ("false alarm", "falsified")]
         rows.append([*case, len(flown), *fell, sum(run["outside"] for run in flown)])
-    columns = ["noise", "fault", "flights", *(f"false alarms, {kind}" for kind in PLANTS), "samples outside, nonlinear"]
+    counted = [f"{what}, {kind}" for kind in PLANTS for what in ("false alarm", "falsified while it holds")]
+    columns = ["noise", "fault", "flights", *counted, "samples outside, nonlinear"]
     if rows:
         table("Flights with large manoeuvres", columns, rows)
 

@@ -18,7 +18,7 @@ from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.observer import WindowObserver
 from svo.observers.window.proof_steps import encode_set, first_set
 from svo.observers.window.setup import joint_rows
-from svo.plant import MonitoredPlant
+from svo.plant import MonitoredPlant, OffersModels
 from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
 from svo.store.values import encode_value
@@ -52,7 +52,8 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
         log = scheduled(plant.scheduler(), log)
     observers = _observers(bank, log)
     if not observers:
-        raise ValueError(f"plant {plant.name!r} has no window observer of a linear model, and no other is written yet")
+        why = f"plant {plant.name!r} has no window observer of a linear model, and no other is written yet"
+        raise ValueError(why + _other_models(plant))
     return {
         "format": FORMAT,
         "plant": plant.name,
@@ -62,6 +63,13 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
         "samples": None if log is None else len(log),
         "observers": observers,
     }
+
+
+def _other_models(plant: MonitoredPlant) -> str:
+    """What to do instead, where a plant offers it."""
+    if not isinstance(plant, OffersModels):
+        return ""
+    return f"; choose models {' or '.join(kind for kind in plant.model_kinds if kind != plant.model_kind)}"
 
 
 def _observers(bank: Bank, log: Log | None) -> dict[str, Any]:

@@ -452,3 +452,9 @@ def test_what_cannot_be_written_is_refused_with_its_reason(tmp_path: Path) -> No
     done = CliRunner().invoke(app, ["describe", str(folder / "two_tanks.toml"), "--out", str(tmp_path / "plant.json")])
     assert done.exit_code == 1
     assert "no window observer of a linear model" in done.output
+
+
+def test_a_plant_with_other_models_is_told_them(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["describe", "eclipse", "--out", str(tmp_path / "plant.json")])
+    assert done.exit_code == 1
+    assert "choose models lpv" in " ".join(done.output.split())
