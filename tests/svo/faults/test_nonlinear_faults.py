@@ -24,7 +24,7 @@ from svo.faults import (
 from svo.functions import sin
 from svo.logs.drive import drive
 from svo.models.nonlinear import NonlinearModel
-from tests.svo.models.nonlinear_plants import CASES, Case, crane, pendulum
+from tests.svo.models.nonlinear_plants import CASES, Case, crane, oscillator, pendulum
 
 SEED = 20_261_201
 START = 0.16  # s: sample 4 of the crane
@@ -122,13 +122,7 @@ def test_a_bank_isolates_one_of_three() -> None:
 
 def test_a_fault_of_a_linear_plant_is_that_of_its_linear_model() -> None:
     """Width of the boxes under the fault's model, of equations and of matrices."""
-    A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [1.0]])
-    common = {"Ts": 0.1, "n": [0.02], "w": [0.3]}
-    linear = UncertainModel.from_continuous(A, B, [[1.0, 0.0]], E=B, **common)
-    nonlinear = NonlinearModel(
-        lambda x, u, w: A @ x + B @ (u + w), lambda x: [x[0]], states=["s", "v"], inputs=["u"], disturbances=["w"],
-        largest=([-9, -9], [9, 9]), **common,
-    )  # fmt: skip
+    linear, nonlinear = oscillator()
     u = np.ones((20, 1))
     start = HPolytope.box([0.5, -1.0], [1.5, 1.0])
     for fault in (

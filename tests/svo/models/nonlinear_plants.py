@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from svo import UncertainModel
 from svo.checks import Array
 from svo.functions import cos, exp, max, sign, sin, sqrt, sroot
 from svo.models.nonlinear import NonlinearModel
@@ -145,6 +146,18 @@ def friction(**changes: Any) -> Case:
         inputs=["force"], disturbances=["push"], Ts=0.02, n=0.002, w=[0.05], largest=([-50, -20], [50, 20]), **changes,
     )  # fmt: skip
     return Case(model, np.array([0.0, 0.3]), np.array([0.01, 0.05]), lambda k: [2.0 * np.sin(0.07 * k)], smooth=False)
+
+
+def oscillator() -> tuple[UncertainModel, NonlinearModel]:
+    """A linear plant, as matrices and as equations."""
+    A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [1.0]])
+    common = {"Ts": 0.1, "n": [0.02], "w": [0.3]}
+    linear = UncertainModel.from_continuous(A, B, [[1.0, 0.0]], E=B, **common)
+    nonlinear = NonlinearModel(
+        lambda x, u, w: A @ x + B @ (u + w), lambda x: [x[0]], states=["s", "v"], inputs=["u"], disturbances=["w"],
+        largest=([-9, -9], [9, 9]), **common,
+    )  # fmt: skip
+    return linear, nonlinear
 
 
 CASES = {

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from polytopes import HPolytope
-from svo import PolytopeObserver, UncertainModel, WindowObserver
+from svo import PolytopeObserver, WindowObserver
 from svo.functions import sqrt
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Step
-from tests.svo.models.nonlinear_plants import CASES, Case, cstr, pendulum, tank
+from tests.svo.models.nonlinear_plants import CASES, Case, cstr, oscillator, pendulum, tank
 
 SEED = 20_261_129
 
@@ -84,13 +84,7 @@ def test_a_disturbance_that_a_sensor_reads_is_shared_with_the_state() -> None:
 
 
 def test_a_linear_plant_is_observed_as_a_linear_model_observes_it() -> None:
-    A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [1.0]])
-    common = {"Ts": 0.1, "n": [0.02], "w": [0.3]}
-    linear = UncertainModel.from_continuous(A, B, [[1.0, 0.0]], E=B, **common)
-    nonlinear = NonlinearModel(
-        lambda x, u, w: A @ x + B @ (u + w), lambda x: [x[0]], states=["s", "v"], inputs=["u"], disturbances=["w"],
-        largest=([-9, -9], [9, 9]), **common,
-    )  # fmt: skip
+    linear, nonlinear = oscillator()
     log = linear.simulate([1.0, 0.0], np.ones((30, 1)), np.random.default_rng(SEED))
     first = HPolytope.box([0.5, -1.0], [1.5, 1.0])
     one, other = (WindowObserver(model, first).run(log) for model in (linear, nonlinear))
