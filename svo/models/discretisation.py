@@ -19,11 +19,19 @@ _ROUNDED_UP = 1e-9  # relative: more than what sums of numbers >= 0, fewer than 
 
 
 def zero_order_hold(A: ArrayLike, B: ArrayLike, Ts: float) -> tuple[Array, Array]:
-    """exp(A Ts) and int_0^Ts exp(A t) dt B, from one exponential of [[A B], [0 0]]; the nearest floats."""
+    """exp(A Ts) and int_0^Ts exp(A t) dt B, from one exponential of [[A B], [0 0]]; the nearest floats.
+
+    Raises
+    ------
+    ValueError
+        If they are beyond all floats.
+    """
     A, B = finite_array("A", A, ("n", "n")), finite_array("B", B, ("n", "m"))
     n, m = B.shape
     seconds = positive_number("Ts", Ts, "sampling time in seconds")
     joint = exponential(np.block([[A, B], [np.zeros((m, n + m))]]), seconds)
+    if not np.isfinite(joint).all():
+        raise ValueError(f"a transition of {seconds:g} s (Ts, or dt) is beyond all floats; expected a shorter one")
     return joint[:n, :n], joint[:n, n:]
 
 
@@ -60,8 +68,8 @@ def left_out(plant: Plant, x: Array, u: Array, vary: Varying) -> Array:
     largest = np.concatenate([[1.0], np.abs(ends).max(axis=1)])
     terms = largest[:, None, None] * np.abs(parts)
     speed, gain = terms.sum(axis=0) @ reach, terms[1:, :, :n].sum(axis=0)
-    total = growth(parts[0, :, :n], plant.Ts) @ (gain @ speed)
     gamma = zero_order_hold(parts[0, :, :n], np.eye(n), plant.Ts)[1]
+    total = growth(parts[0, :, :n], plant.Ts) @ (gain @ speed)
     for part, (low, high), moves in zip(parts[1:], ends, vary.delta, strict=True):
         amount = (high - low) / 2 * reach if moves else np.zeros_like(reach)
         products = np.array([d * w for d in (low, high) for w in (lower, upper)]).reshape(4, nw)

@@ -244,6 +244,7 @@ class Observer(Shown, ABC):
         interval = interval_of(self.model, dt)
         if interval is not None:
             self._check_can(self.takes_intervals, "takes only transitions of the model's Ts: leave dt out")
+            self._check_interval(interval)
         if self._alarm is not None:
             return replace(self._alarm, seconds=perf_counter() - begun)
         if self._number < 0:
@@ -429,6 +430,9 @@ class Observer(Shown, ABC):
     def _late_update(self, y: Array, sample: int) -> Step:
         """A late measurement of a sample of the window; the answer is about the newest sample."""
         raise NotImplementedError
+
+    def _check_interval(self, dt: float) -> None:
+        """Refuse seconds that a transition cannot take, before anything is taken."""
 
     def _set_interval(self, dt: float | None) -> None:
         """The next transition takes ``dt`` seconds; None: the model's ``Ts``."""

@@ -84,6 +84,9 @@ class RecursiveObserver(Observer, Generic[Data]):
             return self._without_set(driven, data)
         return self._go_on(driven, data) or self._give_up(driven, data)
 
+    def _check_interval(self, dt: float) -> None:
+        transition_rows(self.model, dt)
+
     def _set_interval(self, dt: float | None) -> None:
         rows = self._form.state_rows(transition_rows(self.model, dt))
         if self._readings is not None:

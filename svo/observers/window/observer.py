@@ -273,8 +273,7 @@ class WindowObserver(Observer):
             self._recent = recent.read(float(self.model.jitter[~np.isnan(y)].max(initial=0.0)), around)
         return self._said(verdict)
 
-    def _set_interval(self, dt: float | None) -> None:
-        self._dt = dt
+    def _check_interval(self, dt: float) -> None:
         if self._plant is not None:
             return
         check_splits(self.model)
@@ -283,6 +282,12 @@ class WindowObserver(Observer):
                 "dt is given, and exact sensors read every disturbance, which the observer takes out of its program "
                 "(output injection) for transitions of Ts only; state a noise n above zero"
             )
+        transition_rows(self.model, dt)
+
+    def _set_interval(self, dt: float | None) -> None:
+        self._dt = dt
+        if self._plant is not None:
+            return
         rows = self._form.state_rows(transition_rows(self.model, dt))
         self._window.move_by(rows)
         if self._readings is not None:

@@ -203,9 +203,9 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
             now = self._builder.measured(states, data)
         return self._conclude((before,), now, states) if now.joint.within(np.inf) else None
 
-    def _set_interval(self, dt: float | None) -> None:
+    def _check_interval(self, dt: float) -> None:
         check_splits(self.model)
-        super()._set_interval(dt)
+        super()._check_interval(dt)
 
     def _move_by(self, rows: Array) -> None:
         self._stages = (*self._stages[:-1], self._builder.moved(self._stages[-1], rows))

@@ -287,6 +287,21 @@ def test_an_interval_is_a_number_of_seconds(dt: Any) -> None:
         observer.step([0.0], [0.0], dt=dt)
 
 
+@pytest.mark.parametrize("kind", OBSERVERS)
+def test_an_interval_beyond_all_floats_is_named_and_nothing_is_lost(kind: str) -> None:
+    model = UncertainModel.from_continuous([[2.0, 1.0], [0.0, 3.0]], [[0.0], [1.0]], [[1.0, 0.0]], n=[0.1], Ts=0.5)
+    observer = OBSERVERS[kind](model, FIRST)
+    for started in (False, True):
+        for dt in (1e3, 1e300):  # exp(3e3) is no float
+            with pytest.raises(ValueError, match=rf"a transition of {re.escape(f'{dt:g}')} s \(Ts, or dt\) is beyond"):
+                observer.step([0.0], [0.1], dt=dt)
+        if not started:
+            observer.update([0.1])  # the first sample is still to come
+    assert observer.step([0.0], [0.1], dt=0.01).sample == 1
+    with pytest.raises(ValueError, match=r"a transition of 1000 s \(Ts, or dt\) is beyond all floats"):
+        UncertainModel.from_continuous([[1.0]], None, [[1.0]], Ts=1e3)
+
+
 def test_the_code_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     page = (Path(__file__).parents[3] / "docs" / "event_times.md").read_text(encoding="utf-8")
     block = re.search(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
