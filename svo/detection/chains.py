@@ -29,10 +29,16 @@ from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
 
 
+def _window_of(alarm: Alarm) -> WindowCertificate | None:
+    """The proof on a window that an alarm's is, or is about; None where it is of another kind."""
+    proof = alarm.certificate.about() if isinstance(alarm.certificate, OnWindow) else alarm.certificate
+    return proof if isinstance(proof, WindowCertificate) else None
+
+
 def _unknowns(alarm: Alarm, model: UncertainModel) -> str | None:
     """How the bounds of the unknowns in a window's proof are not those of a model: of Delta, and rows on w."""
-    proof = alarm.certificate.about() if isinstance(alarm.certificate, OnWindow) else alarm.certificate
-    if not isinstance(proof, WindowCertificate):
+    proof = _window_of(alarm)
+    if proof is None:
         return None
     known = np.array([model.uncertainties[item - 1].bounds for item in proof.owner]).reshape(-1, 2)
     polytope = model.disturbance_polytope
@@ -47,6 +53,23 @@ def _unknowns(alarm: Alarm, model: UncertainModel) -> str | None:
     else:
         return None
     return f"the {what} not those of the plant's model {alarm.observer!r}"
+
+
+def _around_linearisations(alarm: Alarm, model: NonlinearModel) -> str | None:
+    """How what no linearisation chooses is not the model's: sizes, bounds of w, rows, and the least noise."""
+    proof, carrier = _window_of(alarm), model.carrier
+    if proof is None:
+        return f"the proof is none of a nonlinear model, as {alarm.observer!r} of the plant is"
+    (lower, upper, _), shape = carrier.bounds(carrier.schedule), carrier.stack(carrier.schedule).shape
+    data = proof.model_data()
+    for k, (mine, y) in enumerate(zip(data, (s.y for s in proof.samples), strict=True), alarm.sample + 1 - len(data)):
+        what: str | None = "shape of the matrices"
+        if mine.stack.shape == shape:
+            noise = np.where(np.isnan(y), mine.noise, np.maximum(mine.noise, model.noise))
+            what = mine.difference(ModelSample(mine.stack, noise, (lower, upper)))
+        if what is not None:
+            return f"the {what} of sample {k} differs from that of the plant's model {alarm.observer!r}"
+    return _unknowns(alarm, carrier)
 
 
 def _promises(alarm: Alarm, observer: Observer) -> str | None:
@@ -93,10 +116,12 @@ class PlantModels:
         observer = self.bank(alarm).observers.get(alarm.observer)
         if observer is None:
             return f"the plant's bank has no model {alarm.observer!r:.80}"
-        if not isinstance(observer.model, NonlinearModel):
+        if isinstance(observer.model, NonlinearModel):
+            different = _around_linearisations(alarm, observer.model)
+        else:
             different = self._matrices(alarm, observer) or _unknowns(alarm, observer.model)
-            if different is not None:
-                return different
+        if different is not None:
+            return different
         different = _promises(alarm, observer)
         if different is not None:
             return different

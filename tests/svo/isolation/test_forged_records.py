@@ -17,7 +17,8 @@ from svo.detection.chains import PlantModels
 from svo.isolation.alarms import alarm_line, verify_alarms
 from tests.fuzz import records
 
-CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
+CART, TANKS = EXAMPLES / "cart.toml", EXAMPLES / "two_tanks.toml"
 Record = dict[str, Any]
 
 
@@ -25,6 +26,13 @@ Record = dict[str, Any]
 def cart() -> tuple[Any, Any, list[str]]:
     plant = find_plant(str(CART))
     log = read_log(CART.with_suffix(".csv"), plant)
+    return plant, log, [alarm_line(alarm) for alarm in detect(plant, log, noise="stated").alarms]
+
+
+@pytest.fixture(scope="module")
+def tanks() -> tuple[Any, Any, list[str]]:
+    plant = find_plant(str(TANKS))
+    log = read_log(TANKS.with_suffix(".csv"), plant)
     return plant, log, [alarm_line(alarm) for alarm in detect(plant, log, noise="stated").alarms]
 
 
@@ -107,6 +115,57 @@ def test_a_forged_record_is_refused_once_the_plant_is_at_hand(
         path.write_text(with_digest(record))
         (check,) = verify_alarms(path, log, PlantModels(plant, log).difference)
         assert not check.ok, check.reason
+
+
+def last_halved(name: str) -> Callable[[Record], None]:
+    """The last entry of an array, wherever the record has it."""
+
+    def change(record: Record) -> None:
+        c = record["certificate"]
+        for part in (c["every_sample"], *c["samples"]):
+            if name in part:
+                *others, last = part[name]["hex"].split()
+                part[name]["hex"] = " ".join([*others, (0.5 * float.fromhex(last)).hex()])
+
+    return change
+
+
+def impossible(record: Record) -> None:
+    """A row on w that nothing fulfils: the proof that any reading is false."""
+    c = record["certificate"]
+    width = c["w_rows"]["shape"][1]
+    c["w_rows"] = {"shape": [1, width], "hex": " ".join(["0x1.0p+0", *["0"] * (width - 1)])}
+    c["w_rows_lower"], c["w_rows_upper"] = numbers(1e6), numbers(1e6)
+    for s in c["samples"]:
+        s["on_output"]["hex"] = " ".join("0" for _ in s["on_output"]["hex"].split())
+        s["on_w"] = numbers(0.0)
+    c["samples"][0]["on_w"] = numbers(-1.0)
+
+
+AROUND: dict[str, tuple[Callable[[Record], None], str]] = {
+    "less noise": (last_halved("noise"), "the noise bound of sample"),
+    "half of what a linearisation leaves": (last_halved("w_upper"), "disturbance bound"),
+    "a bound of a sum": (a_sum, "bounds of sums are"),
+    "a row on w": (impossible, "rows on w are"),
+}
+
+
+@pytest.mark.parametrize("what", AROUND)
+def test_what_no_linearisation_chooses_is_the_nonlinear_plants_own(
+    tmp_path: Path, tanks: tuple[Any, Any, list[str]], what: str
+) -> None:
+    plant, log, lines = tanks
+    change, reason = AROUND[what]
+    path = tmp_path / "alarms.jsonl"
+    for line in lines:
+        record = json.loads(line)
+        change(record)
+        path.write_text(with_digest(record))
+        (alone,) = verify_alarms(path)
+        assert alone.ok, alone.reason  # the proof holds: of what the plant does not promise
+        (check,) = verify_alarms(path, log, PlantModels(plant, log).difference)
+        assert not check.ok
+        assert reason in check.reason
 
 
 def test_the_record_of_one_model_is_no_alarm_of_another(tmp_path: Path, cart: tuple[Any, Any, list[str]]) -> None:
