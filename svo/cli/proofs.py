@@ -91,7 +91,7 @@ def describe(
 
     \b
     Example:
-      svo describe eclipse --models lpv --noise quiet --log flight.csv --out plant.json
+      svo describe eclipse --models lpv --log flight.csv --out plant.json
     """
     from svo.detection.plant_record import plant_record
     from svo.plant import BankChoice, with_bank
