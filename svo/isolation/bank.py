@@ -75,7 +75,9 @@ class Bank(Shown, ABC):
 
     # -- samples -----------------------------------------------------------------------------------
 
-    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Verdict:
+    def update(
+        self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None, u_range: ArrayLike | None = None
+    ) -> Verdict:
         """The first measurement, without a transition.
 
         Parameters
@@ -86,6 +88,8 @@ class Bank(Shown, ABC):
             The input from this sample on, where an observer needs it (as `step` needs ``u_next``).
         schedule : optional
             Scheduling value of this sample; needed if an observer's model has a schedule.
+        u_range : (2, nu) array, optional
+            As in `step`.
 
         Raises
         ------
@@ -94,8 +98,8 @@ class Bank(Shown, ABC):
         """
         if self._sample is not None:
             raise ValueError("update was called after the first sample; use step(u=..., y=...), or reset(set) first")
-        now = Sample.given(None, y0, u, schedule)
-        steps = self._ask(lambda name: self._running[name].update(now.y, u=now.u_next, schedule=schedule))
+        now = Sample.given(None, y0, u, schedule, u_range=u_range)
+        steps = self._ask(lambda name: now.first(self._running[name], now.y))
         return self._conclude(0, steps, now)
 
     def step(
@@ -106,6 +110,7 @@ class Bank(Shown, ABC):
         schedule: Any = None,
         deadline: float | None = None,
         dt: float | None = None,
+        u_range: ArrayLike | None = None,
     ) -> Verdict:
         """One transition driven by u, then the measurement y; arguments as for the observers.
 
@@ -126,6 +131,9 @@ class Bank(Shown, ABC):
             exact proof of an alarm and, at the samples at which observers start again, their first programs.
         dt : float, optional
             Seconds from the sample before to this one; by default the models' ``Ts``.
+        u_range : (2, nu) array, optional
+            Lower and upper bounds of the input from this sample on, for as long as a reading may have been taken after
+            its stamp; by default it stays u_next. For the observers whose models have ``jitter``.
 
         Raises
         ------
@@ -137,7 +145,7 @@ class Bank(Shown, ABC):
         """
         if self._sample is None:
             raise ValueError("step was called before the first measurement; call update(y0=...), NaN if there is none")
-        now = Sample.given(u, y, u_next, schedule, dt)
+        now = Sample.given(u, y, u_next, schedule, dt, u_range)
         if deadline is None:
             steps = self._ask(lambda name: now.to(self._running[name], now.y))
         else:
@@ -487,7 +495,7 @@ class Bank(Shown, ABC):
         else:
             kind = type(observer).__name__
             raise TypeError(f"observer {name!r} ({kind}) has no lose_set, and there is no bounded set to start it from")
-        return observer.update(self._nothing() if y is None else y, u=at.u_next, schedule=at.schedule)
+        return at.first(observer, self._nothing() if y is None else y)
 
     def _predict_from(self, name: str, set: HPolytope | None, now: Sample, largest_at: int | None) -> Step:
         """Start from the set of the sample before, leaving out the measurement that nothing explains.

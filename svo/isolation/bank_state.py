@@ -21,6 +21,7 @@ from svo.observers.base import Observer, Step
 from svo.observers.saved_state import digest_of_arrays
 
 State = dict[str, NDArray[Any]]
+_NAMES = ("u", "y", "u_next", "schedule", "dt", "u_range")
 _CONCLUSIONS, _SEAL = "bank.conclusions", "bank.seal"
 
 
@@ -33,25 +34,42 @@ class Sample:
     u_next: ArrayLike | None
     schedule: Any = None
     dt: float | None = None
+    u_range: ArrayLike | None = None
 
     @classmethod
     def given(
-        cls, u: ArrayLike | None, y: ArrayLike, u_next: ArrayLike | None, schedule: Any, dt: float | None = None
+        cls,
+        u: ArrayLike | None,
+        y: ArrayLike,
+        u_next: ArrayLike | None,
+        schedule: Any,
+        dt: float | None = None,
+        u_range: ArrayLike | None = None,
     ) -> Sample:
         """Copies of what a user hands over, whose arrays may hold the next sample when these are needed again."""
         before = None if u is None else real_array("u", u, finite=False)
         after = None if u_next is None else real_array("u_next", u_next, finite=False)
-        return cls(before, real_array("y", y, finite=False, missing=True), after, schedule, dt)
+        ahead = None if u_range is None else real_array("u_range", u_range, finite=False)
+        return cls(before, real_array("y", y, finite=False, missing=True), after, schedule, dt, ahead)
+
+    def first(self, observer: Observer, y: ArrayLike) -> Step:
+        """The answer of an observer to a measurement (ny,) at this sample, its first one."""
+        return observer.update(y, u=self.u_next, schedule=self.schedule, **self._ahead(observer))
 
     def to(self, observer: Observer, y: ArrayLike, **options: Any) -> Step:
         """The answer of an observer to this sample with a measurement (ny,)."""
         if self.dt is not None:
             options["dt"] = self.dt
+        options |= self._ahead(observer)
         return observer.step(self.u, y, u_next=self.u_next, schedule=self.schedule, **options)
+
+    def _ahead(self, observer: Observer) -> dict[str, Any]:
+        """What an observer is told of inputs that follow, whose readings may be taken that late."""
+        return {} if self.u_range is None or observer.jitter is None else {"u_range": self.u_range}
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """Those that are given, by name."""
-        given = {name: getattr(self, name) for name in ("u", "y", "u_next", "schedule", "dt")}
+        given = {name: getattr(self, name) for name in _NAMES}
         try:
             return {name: real_array(name, v, finite=False, missing=True) for name, v in given.items() if v is not None}
         except (TypeError, ValueError) as error:
@@ -60,11 +78,11 @@ class Sample:
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Sample:
         """What `arrays` gave; numbers are numbers again."""
-        u, y, u_next, schedule, dt = (arrays.get(name) for name in ("u", "y", "u_next", "schedule", "dt"))
+        u, y, u_next, schedule, dt, ahead = (arrays.get(name) for name in _NAMES)
         if y is None:
             raise ValueError("y is missing")
         value = float(schedule) if schedule is not None and schedule.ndim == 0 else schedule
-        return cls(u, y, u_next, value, None if dt is None else float(dt))
+        return cls(u, y, u_next, value, None if dt is None else float(dt), ahead)
 
 
 @dataclass(frozen=True, eq=False)

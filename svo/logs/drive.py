@@ -17,15 +17,20 @@ Answer = TypeVar("Answer")
 class Driven(Protocol[Answer_co]):
     """What can be driven over a log: an observer, a bank, a detector or a filter."""
 
-    def update(self, y0: Any, u: Any = None, schedule: Any = None) -> Answer_co:
-        """A measurement without a transition (the first one)."""
+    @property
+    def update(self) -> Callable[..., Answer_co]:
+        """Called as update(y0, u=None, schedule=None): a measurement without a transition (the first one).
+
+        With u_range=... too, as `step`.
+        """
         ...
 
     @property
     def step(self) -> Callable[..., Answer_co]:
         """Called as step(u, y, u_next=None, schedule=None): one transition driven by u, then the measurement y.
 
-        With dt=... too, the seconds of the transition, where a log keeps its own times.
+        With dt=... too, the seconds of the transition, where a log keeps its own times; with u_range=..., bounds of the
+        inputs that follow soon, where stamps may be off (``jitter``).
         """
         ...
 
@@ -46,7 +51,8 @@ def advance(driven: Driven[Answer], held: Array | None, y: Array, u: Array, sche
         Of ``driven.step``, such as ``deadline``.
     """
     if held is None:
-        return driven.update(y, u=u, schedule=schedule)
+        known = {name: options[name] for name in options if name == "u_range"}
+        return driven.update(y, u=u, schedule=schedule, **known)
     return driven.step(held, y, u_next=u, schedule=schedule, **options)
 
 
@@ -89,7 +95,10 @@ def advance_to(driven: Driven[Answer], log: Log, k: int, schedule: Any, **option
     dt = _interval(driven, log, k)
     if dt is not None:
         options = {**options, "dt": dt}
-    return advance(driven, log.u[k - 1] if k else None, readings_at(driven, log, k), log.u[k], schedule, **options)
+    ahead = _inputs_ahead(driven, log, k)
+    if ahead is not None:
+        options = {**options, "u_range": ahead}
+    return advance(driven, log.u[k - 1] if k else None, log.y[k], log.u[k], schedule, **options)
 
 
 def _interval(driven: Driven[Answer], log: Log, k: int) -> float | None:
@@ -101,16 +110,10 @@ def _interval(driven: Driven[Answer], log: Log, k: int) -> float | None:
     return None
 
 
-def readings_at(driven: Any, log: Log, k: int) -> Array:
-    """The measurement (ny,) at sample k of a log, without readings that ``driven`` cannot take.
-
-    A reading whose time stamp is off (``driven.jitter``) may have been taken after an input that changes that soon.
-    """
-    jitter, y = getattr(driven, "jitter", None), log.y[k]
+def _inputs_ahead(driven: Any, log: Log, k: int) -> Array | None:
+    """Bounds (2, nu) of the inputs from sample k of a log on, while readings whose stamps are off may yet be taken."""
+    jitter = getattr(driven, "jitter", None)
     if jitter is None:
-        return y
-    end = int(np.searchsorted(log.time, log.time[k] + jitter.max(), side="left"))
-    for later in range(k + 1, end):
-        if (log.u[later] != log.u[k]).any():
-            return np.where(log.time[later] - log.time[k] < jitter, np.nan, y)
-    return y
+        return None
+    inputs = log.u[k : int(np.searchsorted(log.time, log.time[k] + jitter.max(), side="left"))]
+    return np.array([inputs.min(axis=0), inputs.max(axis=0)]) if len(inputs) > 1 else None

@@ -55,8 +55,8 @@ class RecentInputs:
         left, lower, upper = self.left[open_], self.lower[open_], self.upper[open_]
         return type(self)(self.reach, ages[near], inputs, since[open_], left, lower, upper)
 
-    def around(self, u: Array) -> tuple[Array, Array]:
-        """Bounds of the inputs about a sample from which on it is u (nu,).
+    def around(self, u: Array, ahead: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
+        """Bounds of the inputs about a sample from which on it is u (nu,), and soon within the bounds ``ahead``.
 
         Raises
         ------
@@ -68,9 +68,10 @@ class RecentInputs:
             i = int(np.argmax(beyond))
             raise ValueError(
                 f"the input changes {self.since[i]:.6g} s after a reading whose stamp is known to {self.left[i]:.6g} "
-                "s, and it may have been taken later still; leave such a reading out (NaN), as run(log) does"
+                "s, and it may have been taken later still; leave such a reading out (NaN), or say with u_range=... "
+                "what the input may be by then, as run(log) does"
             )
-        every = np.vstack([self.inputs, u])
+        every = np.vstack([self.inputs, u, *(ahead or ())])
         return every.min(axis=0), every.max(axis=0)
 
     def read(self, jitter: float, u: tuple[Array, Array]) -> Self:

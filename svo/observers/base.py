@@ -31,6 +31,7 @@ from svo.observers.certificate import Certificate
 from svo.observers.data import (
     check_may_start_by_step,
     check_schedule,
+    inputs_ahead,
     inputs_of,
     outputs_of,
     seconds_allowed,
@@ -92,6 +93,7 @@ class Observer(Shown, ABC):
     largest_at: int | None = None
     _number: int = -1
     _schedule: Any = None  # of the newest sample
+    _ahead: tuple[Array, Array] | None = None  # bounds of the inputs that follow the sample of a hook soon
     _alarm: Step | None = None
     _newest: Step | None = None
 
@@ -170,7 +172,9 @@ class Observer(Shown, ABC):
         self._forget()
         self._lose_set()
 
-    def update(self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None) -> Step:
+    def update(
+        self, y0: ArrayLike, u: ArrayLike | None = None, schedule: Any = None, u_range: ArrayLike | None = None
+    ) -> Step:
         """The first measurement, without a transition.
 
         Parameters
@@ -181,6 +185,8 @@ class Observer(Shown, ABC):
             Needed where `step` needs ``u_next``.
         schedule : optional
             Scheduling value at this sample.
+        u_range : (2, nu) array, optional
+            As in `step`.
 
         Raises
         ------
@@ -193,7 +199,9 @@ class Observer(Shown, ABC):
         outputs = outputs_of(self.model, y0)
         inputs = inputs_of(self.model, "u", u, self.needs_next_input)
         check_schedule(self.model, schedule)
-        return self._ask(begun, schedule, lambda: self._update(outputs, inputs, schedule))
+        ahead = inputs_ahead(self.model, u_range, inputs)
+        with self._taking(None, ahead):
+            return self._ask(begun, schedule, lambda: self._update(outputs, inputs, schedule))
 
     def step(
         self,
@@ -203,6 +211,7 @@ class Observer(Shown, ABC):
         schedule: Any = None,
         deadline: float | None = None,
         dt: float | None = None,
+        u_range: ArrayLike | None = None,
     ) -> Step:
         """One transition x(k) -> x(k+1) driven by u, then the measurement y at k + 1.
 
@@ -225,6 +234,9 @@ class Observer(Shown, ABC):
             Seconds from k to k + 1; by default the model's ``Ts``. Of a model in continuous time (by
             `UncertainModel.from_continuous`, or a `NonlinearModel`) any number above zero, for which the transition is
             discretised; of one in discrete time ``Ts`` within 1 %. Only where `takes_intervals`.
+        u_range : (2, nu) array, optional
+            Lower and upper bounds of the input from k + 1 on, for as long as a reading may have been taken after its
+            stamp; by default it stays u_next. Only of a model with ``jitter``.
 
         Raises
         ------
@@ -241,6 +253,7 @@ class Observer(Shown, ABC):
         following = inputs_of(self.model, "u_next", u_next, self.needs_next_input)
         outputs = outputs_of(self.model, y)
         check_schedule(self.model, schedule)
+        ahead = inputs_ahead(self.model, u_range, following)
         interval = interval_of(self.model, dt)
         if interval is not None:
             self._check_can(self.takes_intervals, "takes only transitions of the model's Ts: leave dt out")
@@ -250,7 +263,7 @@ class Observer(Shown, ABC):
         if self._number < 0:
             check_may_start_by_step(self.model)
             self.update(np.full(self.model.n_outputs, np.nan), inputs, schedule)
-        with self._taking(interval):
+        with self._taking(interval, ahead):
             return self._ask(begun, schedule, lambda: self._step(inputs, outputs, following, schedule, deadline))
 
     def run(self, log: Log) -> Record:
@@ -477,16 +490,19 @@ class Observer(Shown, ABC):
         return self._answered(step, begun, stopped)
 
     @contextmanager
-    def _taking(self, interval: float | None) -> Iterator[None]:
-        """While the transition of an interval is taken, which is that of Ts again if it is refused."""
+    def _taking(self, interval: float | None, ahead: tuple[Array, Array] | None) -> Iterator[None]:
+        """While a sample is taken: its transition is that of Ts again if it is refused."""
         if interval is not None:
             self._set_interval(interval)
+        self._ahead = ahead
         try:
             yield
         except BaseException:
             if interval is not None:
                 self._set_interval(None)
             raise
+        finally:
+            self._ahead = None
 
     def _answered(self, step: Step, begun: float, stopped: int) -> Step:
         # nobody has seen it yet, and a copy takes a twentieth of a fast observer's time

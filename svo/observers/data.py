@@ -39,6 +39,20 @@ def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: boo
     return array
 
 
+def inputs_ahead(
+    model: UncertainModel | NonlinearModel, given: ArrayLike | None, now: Array
+) -> tuple[Array, Array] | None:
+    """Bounds (nu,) of the inputs that follow soon, among which is that of ``now``; None if none are given."""
+    if given is None:
+        return None
+    if model.jitter is None:
+        raise ValueError("u_range is given, and the stamps of the model's sensors are exact (no jitter): leave it out")
+    lower, upper = finite_array("u_range", given, (2, model.n_inputs))
+    if not ((lower <= now) & (now <= upper)).all():
+        raise ValueError(f"u_range is from {lower} to {upper}; expected bounds that hold the sample's own input, {now}")
+    return lower, upper
+
+
 def check_schedule(model: UncertainModel | NonlinearModel, schedule: Any) -> None:
     """Raise an error if a model needs a schedule and there is none, or takes none and there is one."""
     if schedule is not None and isinstance(model, NonlinearModel):

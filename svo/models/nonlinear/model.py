@@ -25,7 +25,7 @@ from svo.models.nonlinear.flow import Flow, Span, Undecided
 from svo.models.nonlinear.output import LinearOutput, check_output
 from svo.models.nonlinear.plant_kernel import PlantKernel
 from svo.models.nonlinear.simulation import given_values, simulated
-from svo.models.nonlinear.stamps import stamped
+from svo.models.nonlinear.stamps import seen_near, stamped
 from svo.models.nonlinear.tracing import Function, OfVectors, Symbols, retraced, traced, with_kept
 from svo.models.nonlinear.transition import Transition
 from svo.models.stamps import jitter_of
@@ -335,6 +335,16 @@ class NonlinearModel(Value, Shown):
         return stamped(
             self.flow, self.reading, found, self.jitter, Span(lower, upper), Span(*around), tuple(self.outputs or ())
         )
+
+    def seen_near(self, box: Span, y: Array, around: tuple[Array, Array]) -> Span:
+        """What readings y (ny,) within ``jitter`` of a sample leave of a ``box`` of states there; NaN = none.
+
+        ``around`` are bounds of the inputs of that time. A box that holds no state with these readings stays as it is.
+        """
+        if self.jitter is None:
+            return box
+        names, inputs = tuple(self.outputs or ()), Span(*around)
+        return seen_near(self.flow, self.reading, self.kernel.cut, self.jitter, box, y, inputs, names)
 
     def check_first(self, lower: Array, upper: Array) -> None:
         """Refuse first states from ``lower`` to ``upper`` (n,) for which the equations do not hold or have no value.

@@ -247,13 +247,13 @@ class WindowObserver(Observer):
 
     def _update(self, y: Array, u: Array, schedule: Any) -> WindowStep:
         recent = None if self._recent is None else RecentInputs.none(self._recent.reach, u.size)
-        around = None if recent is None else recent.around(u)
+        around = None if recent is None else recent.around(u, self._ahead)
         return self._seen(recent, around, np.zeros(u.size), u, y, schedule, None)
 
     def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> WindowStep:
         dt, self._dt = self._dt, None
         recent = None if self._recent is None else self._recent.moved(u, dt or self.Ts)
-        around = None if recent is None else recent.around(u_next)
+        around = None if recent is None else recent.around(u_next, self._ahead)
         if self._plant is not None:
             self._relinearise(self._plant, u, dt)
         elif self._stamped is not None:

@@ -96,6 +96,7 @@ class Relinearised:
         """
         box, model = self.box, self.model
         for _ in range(2):
+            box = model.seen_near(box, y, around)
             output = model.output_near(*box, u, around)
             box = model.kernel.cut(box, y, output) or box
         return Linearisation.before(output, model.noise, model.n_inputs), box

@@ -27,9 +27,12 @@ from svo import (
     verify,
 )
 from svo.logs.drive import drive
+from svo.models.draws import draw
 from svo.models.nonlinear import Span
+from svo.models.nonlinear.simulation import integrated
 from svo.models.stamps import StampErrors
 from svo.plant.description import read_description
+from tests.svo.models.nonlinear_plants import CASES
 from tests.svo.observers.event_plants import EventCase, EventPlant
 from tests.svo.observers.nonlinear_events import nonlinear_case
 from tests.svo.observers.test_event_times import exclusions
@@ -97,6 +100,39 @@ def test_a_nonlinear_widening_is_that_of_the_same_linear_plant() -> None:
     np.testing.assert_allclose(found.R, [0.1 * (3.0 + 0.1 * 1.1), 0.3 * 1.1], rtol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["tank", "pendulum", "cstr"])
+def test_a_state_is_among_those_that_a_reading_before_or_after_leaves(name: str) -> None:
+    rng, case = np.random.default_rng([16, len(name)]), CASES[name](varying="all")
+    J = 0.5 * case.model.Ts
+    model = case.model.replace(jitter=J)
+    n, ny, flow, kept = model.n_states, model.n_outputs, model.flow, 0
+    for _ in range(15):
+        x, u = case.x0 + case.spread * rng.uniform(-3.0, 3.0, n), np.array(case.u(int(rng.integers(50))), dtype=float)
+        room = case.spread * rng.choice([0.1, 1.0, 10.0]) * rng.uniform(0.0, 2.0, (2, n))
+        physical = model.physical_range
+        inside = (-np.inf, np.inf) if physical is None else (physical.lower, physical.upper)
+        box = Span(np.maximum(x - room[0], inside[0]), np.minimum(x + room[1], inside[1]))
+        y = np.full(ny, np.nan)
+        for i in range(ny):  # each at a time of its own
+            w, time = draw(*flow.w, rng, True), J * rng.choice([-1.0, 1.0, rng.uniform(-1.0, 1.0)])
+            there = integrated(flow, x, w, u, float(time), 8)
+            y[i] = model.reading.values(np.concatenate([there, w, u]))[i] + rng.choice([-1.0, 1.0]) * model.noise[i]
+        left = model.seen_near(box, y, (u, u))
+        room_of = 1e-6 * (1.0 + np.abs(x))  # of the integration
+        assert (x >= left.lower - room_of).all()
+        assert (x <= left.upper + room_of).all()
+        kept += bool(np.array_equal(left.lower, box.lower) and np.array_equal(left.upper, box.upper))
+    assert kept < 10
+
+
+def test_a_set_that_starts_again_is_found_by_one_reading_whose_stamp_is_off() -> None:
+    model = CASES["cstr"]().model
+    model = model.replace(jitter=0.5 * model.Ts)
+    largest, u = Span(model.start_range.lower, model.start_range.upper), np.array([300.0])
+    left = model.seen_near(largest, np.array([350.0]), (u, u))
+    assert left.width[1] < 30.0 < largest.width[1]
+
+
 def test_a_flow_meter_reads_the_flow_of_its_own_time() -> None:
     """A disturbance in an output is not that of the stamp, so its row has its range instead."""
     model = NonlinearModel(
@@ -146,17 +182,41 @@ def test_an_input_that_changes_soon_after_a_reading_is_an_error_that_leaves_the_
         observer.step([1.0], [0.0, 0.0])
 
 
-def test_a_log_goes_without_the_readings_that_may_be_of_another_input() -> None:
+def test_a_log_knows_the_inputs_that_follow_a_reading() -> None:
     times = np.array([0.0, 0.3, 0.35, 0.9])
-    log = Log(times, np.array([[0.0], [0.0], [1e-3], [1e-3]]), np.zeros((4, 2)))
-    model = cart(jitter=[0.1, 0.01])
-    observer, other = WindowObserver(model, FIRST), WindowObserver(model, FIRST)
+    log = Log(times, np.array([[0.0], [0.0], [0.01], [0.01]]), np.zeros((4, 2)))
+    model = cart(jitter=[0.1, 0.01], D=[[0.02], [0.0]])
+    observer, told, blind = (WindowObserver(model, FIRST) for _ in range(3))
     boxes = [np.array(step.box) for step in drive(observer, log)]
-    y = log.y.copy()
-    y[1, 0] = np.nan
-    assert [np.array(step.box).tobytes() for step in drive(other, replace(log, y=y))] == [b.tobytes() for b in boxes]
-    bank = ArchitectureI(WindowObserver(model, FIRST), {"free": WindowObserver(cart([0.1, 0.01], w=[0.5]), FIRST)})
+    told.update([0.0, 0.0], u=[0.0])
+    step = told.step([0.0], [0.0, 0.0], u_next=[0.0], dt=0.3, u_range=[[0.0], [0.01]])
+    assert np.array(step.box).tobytes() == boxes[1].tobytes()
+    after = told.step([0.0], [0.0, 0.0], u_next=[0.01], dt=0.35 - 0.3)
+    assert np.array(after.box).tobytes() == boxes[2].tobytes()
+    unread = log.y.copy()
+    unread[1, 0] = np.nan
+    without = [np.array(step.box) for step in drive(blind, replace(log, y=unread))]
+    assert boxes[1][1, 0] < without[1][1, 0]  # the position is known better, by a reading that may have had either
+    bank = ArchitectureI(WindowObserver(model, FIRST), {"free": WindowObserver(cart(None, w=[0.5]), FIRST)})
     assert bank.run(log).detected_at is None
+    again = ArchitectureI(WindowObserver(model, FIRST), {"free": WindowObserver(cart(None, w=[0.5]), FIRST)})
+    again.update([0.0, 0.0], u=[0.0], u_range=[[0.0], [0.01]])
+    again.load_state_dict(again.state_dict())
+    assert again.step([0.0], [0.0, 0.0], u_next=[0.01], dt=0.05).state == "nominal"
+
+
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [([[0.0], [1.0]], "bounds that hold"), ([0.0, 1.0], "shape"), ([[2.0], [np.inf]], "finite")],
+)
+def test_inputs_to_come_are_checked_before_anything_is_taken(bounds: list[Any], message: str) -> None:
+    observer = WindowObserver(cart(), FIRST)
+    observer.update([0.0, 0.0], u=[2.0])
+    with pytest.raises(ValueError, match=message):
+        observer.step([2.0], [0.0, 0.0], u_next=[2.0], u_range=bounds)
+    exact = WindowObserver(cart(None), FIRST)
+    with pytest.raises(ValueError, match="no jitter"):
+        exact.update([0.0, 0.0], u_range=[[0.0], [1.0]])
 
 
 @pytest.mark.parametrize("kind", ["linear", "nonlinear"])
