@@ -8,21 +8,24 @@ from the set leaves it, decided in rationals about the rows and matrices as they
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import Certificate, HPolytope, UndecidedError
+from polytopes.inclusion import half_spaces
 from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
+from svo.analysis.kept_vertices import can_be_kept
 from svo.analysis.one_step_sets import LinearSystem, predecessor, system_of
 from svo.checks import Array, expect, expect_kind, real_array, real_number, whole_number
 from svo.models.model import UncertainModel
 
 _SLACK = 1e-6  # of the factor: room for rounding in the proof
-_INWARD = 1e-11  # of its terms: how far a row moves inward where rounding left no proof
+_ENDED = 1e-9  # of the width of a set along a row: by so much it may break it where a search ends
+_INWARD = (1e-11, 1e-9, 1e-7)  # of its terms: how far a row moves inward where rounding left no proof
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +69,8 @@ class InvariantSet(Shown):
 def is_invariant(P: HPolytope, system: LinearSystem, room: Array | None = None) -> bool:
     """Whether no transition from P leaves it, decided exactly; with inputs, whether some input keeps every state in.
 
-    With inputs that is decided about the predecessor of P, which is exact where its numbers are short (integers and
-    short fractions), and else a little too large: then this is no proof, and False is answered.
+    With inputs every vertex is asked for one (Gutman and Cwikel 1986); where rounding of a side leaves that open, the
+    answer is False.
 
     Parameters
     ----------
@@ -84,15 +87,7 @@ def is_invariant(P: HPolytope, system: LinearSystem, room: Array | None = None) 
     if system.inputs is None:
         n, steps = system.n_states, system.transitions(P, room)
         return steps <= P.lift(steps.dim, range(steps.dim - n, steps.dim))
-    return _is_short(P, system) and predecessor(P, system) >= P
-
-
-def _is_short(P: HPolytope, system: LinearSystem) -> bool:
-    tables = [P.table, *(Q.table for Q in (system.inputs, system.disturbances) if Q is not None)]
-    numbers = [part.ravel() for table in tables for part in table]
-    numbers += [part.ravel() for part in (system.A, system.B, system.E, system.a)]
-    every = np.concatenate(numbers) * 2.0**16
-    return bool((every == np.round(every)).all() and (np.abs(every) < 2.0**32).all())
+    return can_be_kept(P, system)
 
 
 @options_by_name
@@ -105,9 +100,9 @@ def largest_invariant_set(
 ) -> InvariantSet:
     """The largest set in a constraint that the system does not leave, for all w (and for some u, where it has inputs).
 
-    Every iterate contains it; the last one is proved invariant where the search ends.  Where rounding leaves no proof
-    of a system without inputs, the search is done again with new rows moved inward by 1e-11 of their terms: then the
-    set is invariant, and smaller than the largest by some such parts.
+    Every iterate contains it; the last one is proved invariant where the search ends.  Where that leaves no proof, the
+    search goes on from there with new rows moved inward by 1e-11 of their terms, then 1e-9 and 1e-7: the set is then
+    invariant, smaller than the largest by some such parts, and the reason names them.
 
     Parameters
     ----------
@@ -121,10 +116,14 @@ def largest_invariant_set(
     known, most = system_of(system, inputs), whole_number("max_steps", max_steps, least=1)
     expect(constraint.dim == known.n_states, "constraint", constraint, f"a set in R^{known.n_states}")
     found = _iterated(constraint, known, most, 0.0)
-    if found.status != "undecided" or known.inputs is not None or found.steps == most:
+    if found.status != "undecided" or found.steps == most:
         return found
-    again = _iterated(constraint, known, most, _INWARD)
-    return again if again.status == "invariant" else found
+    for part in _INWARD:
+        again = _iterated(found.set, known, most - found.steps, part)
+        if again.status == "invariant":
+            reason = f"proved in rationals; rows were moved inward by {part:g} of their terms"
+            return replace(again, steps=found.steps + again.steps, reason=reason)
+    return found
 
 
 def _iterated(constraint: HPolytope, system: LinearSystem, most: int, inward: float) -> InvariantSet:
@@ -136,12 +135,20 @@ def _iterated(constraint: HPolytope, system: LinearSystem, most: int, inward: fl
             return InvariantSet("empty", current, step, "an iterate is empty", system, answer.certificate)
         if answer.status == "undecided" or step == most:
             break
-        before = predecessor(current, system)
-        if before.contains(current):
+        before = _moved_inward(predecessor(current, system), current, inward)
+        if _holds(before, current, 0.25 * inward or _ENDED):
             return _ended(current, constraint, step, system)
-        current = _reduced(current & _moved_inward(before, current, inward))
+        current = _reduced(current & before)
     reason = f"it did not end in {step} steps: the set is the last outer iterate, and not invariant"
     return InvariantSet("undecided", current, step, reason, system)
+
+
+def _holds(before: HPolytope, current: HPolytope, part: float) -> bool:
+    """Whether the current set reaches beyond no row of another by more than a part of its width along it."""
+    normals, sides = half_spaces(before)
+    values, opposite = current.support(normals), current.support(-normals)
+    widths = np.where(np.isfinite(values + opposite), values + opposite, np.abs(sides))
+    return bool((values <= sides + part * np.maximum(widths, 0.0)).all())
 
 
 def _moved_inward(before: HPolytope, current: HPolytope, part: float) -> HPolytope:

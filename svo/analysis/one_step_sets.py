@@ -7,15 +7,20 @@ chosen.  Everything is an operation of `polytopes` (Blanchini and Miani 2015, ch
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes import HPolytope
+from polytopes.integers import up
+from polytopes.outer_supports import exact_support
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, expect_kind, real_array
 from svo.models.model import UncertainModel
+
+_FEW_ROWS = 12  # up to which supports are taken exactly: about a millisecond each
 
 
 @options_by_name
@@ -100,6 +105,31 @@ class LinearSystem:
         """How many states there are."""
         return len(self.A)
 
+    @cached_property
+    def disturbed(self) -> HPolytope | None:
+        """All ``(w, E w)``; exact, where ``E w`` alone is rounded."""
+        if self.disturbances is None:
+            return None
+        nw = self.disturbances.dim
+        step = np.hstack([self.E, -np.eye(self.n_states)])
+        space = self.disturbances.lift(nw + self.n_states)
+        return space & HPolytope(np.empty((0, step.shape[1])), [], step, np.zeros(self.n_states))
+
+    def kept_inputs(self, start: HPolytope, sure: HPolytope) -> HPolytope:
+        """All ``(x, u, A x + B u + a)`` with x in `start`, u in its set and the third in `sure`; exact."""
+        n, nu = self.n_states, self.B.shape[1]
+        step = np.hstack([self.A, self.B, -np.eye(n)])
+        joint = start if self.inputs is None else start.product(self.inputs)
+        space = joint.lift(2 * n + nu) & sure.lift(2 * n + nu, range(n + nu, 2 * n + nu))
+        return space & HPolytope(np.empty((0, step.shape[1])), [], step, -self.a)
+
+    def is_short(self, *sets: HPolytope) -> bool:
+        """Whether all numbers of the system and of some sets are multiples of 2^-16 below 2^16: sets are exact then."""
+        every = [*sets, *(P for P in (self.inputs, self.disturbances) if P is not None)]
+        parts = [part.ravel() for P in every for part in P.table]
+        numbers = np.concatenate([*parts, *(block.ravel() for block in (self.A, self.B, self.E, self.a))]) * 2.0**16
+        return bool((numbers == np.round(numbers)).all() and (np.abs(numbers) < 2.0**32).all())
+
     def transitions(self, start: HPolytope, room: Array | None = None) -> HPolytope:
         """All ``(x, u, w, x+)`` with x in `start` and x+ the next state, within `room` (n,) if given; exact."""
         n, sets = self.n_states, [start, *(P for P in (self.inputs, self.disturbances) if P is not None)]
@@ -131,7 +161,8 @@ def predecessor(
 ) -> HPolytope:
     """``{x : there is u in U with A x + B u + a + E w in the target for all w in W}``, exact or outward.
 
-    The Pontryagin difference of the target and ``E W``, pulled back, and projected on x where there are inputs.
+    The Pontryagin difference of the target and ``E W``, pulled back, and projected on x where there are inputs; there
+    floats tell the normals, and the sides are supports of all ``(x, u, x+)``, rounded up.
 
     Parameters
     ----------
@@ -141,13 +172,35 @@ def predecessor(
         The set of u, where a model is given that has inputs.
     """
     known = system_of(system, inputs)
-    sure = target if known.disturbances is None else target - known.E @ known.disturbances
-    back = sure.preimage(np.hstack([known.A, known.B]), known.a)
+    expect(target.dim == known.n_states, "target", target, f"a set in R^{known.n_states}")
+    sure = whatever_comes(target, known)
     if known.inputs is None:
-        return back
-    n = known.n_states
-    joint = back & known.inputs.lift(n + known.inputs.dim, range(n, n + known.inputs.dim))
-    return joint.project(range(n))
+        return sure.preimage(known.A, known.a)
+    n, moves = known.n_states, np.hstack([known.A, known.B])
+    U = known.inputs.lift(n + known.inputs.dim, range(n, n + known.inputs.dim))
+    if known.is_short(sure):
+        return (sure.preimage(moves, known.a) & U).project(range(n))
+    joint = known.kept_inputs(HPolytope.whole_space(n), sure)
+    if joint.is_empty():
+        return HPolytope.empty(n)
+    near = U & HPolytope(sure.A @ moves, sure.b - sure.A @ known.a, sure.C @ moves, sure.d - sure.C @ known.a)
+    shadow = (joint if near.is_empty() else near).project(range(n))
+    normals = np.vstack([shadow.A, shadow.C, -shadow.C])
+    directions = np.pad(normals, ((0, 0), (0, joint.dim - n)))
+    if joint.b.size > _FEW_ROWS:
+        return HPolytope(normals, joint.support(directions))
+    return HPolytope(normals, [up(exact_support(joint, row)) for row in directions])
+
+
+def whatever_comes(target: HPolytope, system: LinearSystem) -> HPolytope:
+    """``{z : z + E w in the target for all w in W}``: the rows of the target moved inward, exact or outward."""
+    W, both = system.disturbances, system.disturbed
+    if W is None or both is None:
+        return target
+    if np.array_equal(system.E, np.eye(system.n_states)):
+        return target - W
+    n, nw = system.n_states, W.dim
+    return (target.lift(nw + n, range(nw, nw + n)) - both).slice(dict.fromkeys(range(nw), 0.0))
 
 
 @options_by_name
