@@ -79,7 +79,7 @@ class Findings(Shown, ABC):
     @property
     @abstractmethod
     def reason(self) -> str | None:
-        """Of the first undecided answer that has one: the observer, and why."""
+        """Of the first undecided answer that has one: the observer, the sample, and why."""
 
     @property
     @abstractmethod

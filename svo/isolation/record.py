@@ -113,7 +113,7 @@ class BankRecord(Shown):
     global_seconds : (K,) array or None
         Wall time of the global observer's step, NaN where it was not stepped; None if the bank has none.
     reason : str or None
-        Of the first undecided answer that has one: the observer, and why.
+        Of the first undecided answer that has one: the observer, the sample, and why.
     """
 
     names: tuple[str, ...]

@@ -34,7 +34,7 @@ class Outcome:
     undecided, stopped : int
         Over all samples and the observers of ``names``.
     reason : str or None
-        Of the first undecided answer that has one: the observer, and why.
+        Of the first undecided answer that has one: the observer, the sample, and why.
     verdict : Verdict
         The latest one.
     """
@@ -61,7 +61,7 @@ class Outcome:
             if name in self.names:
                 if step.verdict == "undecided":
                     self.undecided += 1
-                    self.reason = self.reason or (f"{name}, {step.reason}" if step.reason else None)
+                    self.reason = self.reason or _reason(name, step.reason, verdict.sample)
                 self.stopped += step.stopped
                 is_dead = name not in verdict.alive
             else:
@@ -72,6 +72,12 @@ class Outcome:
             self.detected_at = verdict.detected_at
         if self.isolated_at is None:
             self.isolated_at, self.fault = verdict.isolated_at, verdict.fault
+
+
+def _reason(name: str, why: str | None, sample: int) -> str | None:
+    """Who is undecided, when and why."""
+    where = "" if why is None or f"at sample {sample}," in why else f" at sample {sample}"
+    return None if why is None else f"{name}{where}, {why}"
 
 
 class Recorder(Outcome):

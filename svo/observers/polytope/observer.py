@@ -14,7 +14,7 @@ from polytopes import HPolytope, UndecidedError
 from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
 from svo.models import NormalForm, UncertainModel, may_be_nonzero, set_in
-from svo.observers.answers import Step
+from svo.observers.answers import NO_PROOF, Step
 from svo.observers.data import relative_slack, stack_at
 from svo.observers.first_states import finite_box
 from svo.observers.free_start import Reading
@@ -198,7 +198,7 @@ class PolytopeObserver(RecursiveObserver[Sample]):
         return step
 
     def _keep(self, sample: Sample, outcome: Outcome) -> PolytopeStep:
-        reason = None
+        reason = NO_PROOF if outcome.verdict == "undecided" else None
         if isinstance(outcome.certificate, PolytopeCertificate):
             outcome = outcome._replace(certificate=replace(outcome.certificate, largest_at=self.largest_at))
         if outcome.verdict != "falsified" and self._normal.physical_range is not None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from svo.checks import Array
 from svo.models.normal_form import ENORMOUS
 from svo.observers import window_kernel as kernel
-from svo.observers.answers import VerdictName
+from svo.observers.answers import NO_PROOF, OUT_OF_TIME, VerdictName
 from svo.observers.given_units import window_out
 from svo.observers.readings import OUTSIDE
 from svo.observers.saved_state import arrays_of, take_exactly
@@ -371,8 +371,7 @@ class Window:
         )
         if meets:
             return verdict
-        self.reason = OUTSIDE  # not proven, so no alarm
-        return "undecided"
+        return self._undecided(OUTSIDE)  # not proven, so no alarm
 
     # -- programs ----------------------------------------------------------------------------------------
 
@@ -403,7 +402,7 @@ class Window:
             return "consistent" if decided else self._ask_highs()
         if memory.time - memory.base == memory.size.N:
             memory.arrays["clock"][kernel.PENDING] = 1
-        return "consistent" if decided else "undecided"
+        return "consistent" if decided else self._undecided(OUT_OF_TIME)
 
     def _conclude(self, task: int, verdict: int, program: int) -> VerdictName:
         """What the programs of a task say; those after one that found the window empty have yet to be solved."""
@@ -445,7 +444,7 @@ class Window:
             elif task == kernel.ARRIVAL and result.proof.verify():
                 self.proof = result.proof
                 return "falsified"
-        return "consistent" if has_point else "undecided"
+        return "consistent" if has_point else self._undecided(NO_PROOF)
 
     def _ask_highs(self) -> VerdictName:
         arrays = self.memory.arrays
@@ -455,4 +454,8 @@ class Window:
                 arrays["farkas"][:] = multipliers
                 if self._prove():
                     return "falsified"
-        return "consistent" if feasible else "undecided"
+        return "consistent" if feasible else self._undecided(NO_PROOF)
+
+    def _undecided(self, why: str) -> VerdictName:
+        self.reason = why
+        return "undecided"

@@ -15,7 +15,7 @@ from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
 from svo.models import NormalForm, UncertainModel
 from svo.models.intervals import check_splits
-from svo.observers.answers import VerdictName
+from svo.observers.answers import NO_PROOF, VerdictName
 from svo.observers.data import relative_slack, stack_at
 from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
@@ -240,7 +240,7 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
         return "undecided", None
 
     def _answer(self, verdict: VerdictName, now: Stage | None, certificate: ZonotopeCertificate | None) -> ZonotopeStep:
-        joint, reason = (None, OUTGROWN) if now is None else (now.joint, None)
+        joint, reason = (None, OUTGROWN) if now is None else (now.joint, NO_PROOF if verdict == "undecided" else None)
         return ZonotopeStep(joint, self._form, verdict=verdict, certificate=certificate, reason=reason)
 
 
