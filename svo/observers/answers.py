@@ -34,12 +34,12 @@ class Step(Shown, ABC):
     certificate : Certificate or None
         Proof of the falsification.
     reason : str or None
-        Why a verdict is "undecided"; observers of the library always say so: "outgrown" (the set has grown beyond all bounds of use in a gap
-        of the measurements, and what came back does not yet bound the state), "outside the physical range" (of all that
-        the data allow, without a proof), "a reading is too large" (for a polytope, which then goes on without it),
-        "outside: at sample ..." (a nonlinear model is not linearised there, for the cause that follows; its set starts
-        again from ``largest``), "out of time" (the deadline ended the programs), "no proof" (the programs found neither a
-        state that explains the data nor a proof that there is none).
+        Why a verdict is "undecided"; observers of the library always say so. "outgrown": the set has grown beyond all
+        bounds of use in a gap of the measurements, and what came back does not yet bound the state. "outside the
+        physical range": of all that the data allow, without a proof. "a reading is too large": for a polytope, which
+        then goes on without it. "outside: at sample ...": a nonlinear model is not linearised there, for the cause that
+        follows; its set starts again from ``largest``. "out of time": the deadline ended the programs. "no proof": they
+        found neither a state that explains the data nor a proof that there is none.
     sample : int
         Counted from the first measurement, which is 0; the observer fills it in. After a falsification it is that of
         the falsification until the observer is reset.
