@@ -65,4 +65,11 @@ ends rates_at_faces(const plant *p, integer i);
 /* A box (in z) that holds x(t) within a time h from `before` on, and the forms of f over it; 0 if none is found. */
 int plant_enclose(plant *p, double h, outcome *found);
 
+/* transition.c and output.c, where they are described: what a sample of an observer needs. */
+EXPORTED integer fdi_plant_moved(const double *block, double *scratch, const double *known_low,
+                                 const double *known_high, double *low, double *high, const double *u, double T,
+                                 double *rows, outcome *found);
+EXPORTED integer fdi_plant_measured(const double *block, double *scratch, double *low, double *high, const double *y,
+                                    const double *u, double *rows, double *noise, outcome *found);
+
 #endif

@@ -130,7 +130,7 @@ def take(address: int, eps: float, limit: int) -> tuple[int, int, int]:
     Returns what `enter` returns, or OUTGROWN; the verdict; the program that found the window empty, or -1. If the
     verdict is FULL the sample is half done: it goes on with the next call, once the window is in a block of larger K.
     """
-    return _told(_take(address, eps, limit))
+    return told(_take(address, eps, limit))
 
 
 def take_sample(address: int, sample: Iterable[Array], eps: float, limit: int) -> tuple[int, int, int]:
@@ -142,10 +142,11 @@ def take_sample(address: int, sample: Iterable[Array], eps: float, limit: int) -
         Floats in normal form: u, u_next (nu,), y (ny,); stack (ni, n + ny, n + nu + 1 + nw), noise (ny,), w_lower and
         w_upper (nw,).
     """
-    return _told(_take_sample(address, *[array.tobytes() for array in sample], eps, limit))
+    return told(_take_sample(address, *[array.tobytes() for array in sample], eps, limit))
 
 
-def _told(found: int) -> tuple[int, int, int]:
+def told(found: int) -> tuple[int, int, int]:
+    """What is in the one number that the core tells of a sample: code, verdict, program."""
     return found & 7, found >> 3 & 3, (found >> 5) - 1
 
 
@@ -173,7 +174,7 @@ def follow(
     addresses = [native.address(array) for array in samples]
     count, is_scheduled = len(samples[0]), len(samples[3]) > 1
     done = _follow(address, count, is_scheduled, *addresses, eps, limit, to_boxes, native.address(result))
-    return int(done), _told(int(result[0]))
+    return int(done), told(int(result[0]))
 
 
 def enter(address: int) -> int:

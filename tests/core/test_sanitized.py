@@ -14,6 +14,7 @@ pytestmark = pytest.mark.slow
 
 FILES = (
     "tests/svo/observers/window/test_room_for_bases.py",
+    "tests/svo/observers/window/test_nonlinear_at_once.py",
     "tests/svo/observers/test_gaps.py",
     "tests/svo/observers/test_late_measurements.py",
     "tests/svo/observers/test_memory_layouts.py",

@@ -62,6 +62,13 @@ class PlantKernel:
     largest : StateRange
     outputs : sequence of str
         Names, for messages.
+
+    Attributes
+    ----------
+    address : int
+        Where the block lies.
+    room : int
+        Doubles of scratch that a call of the core needs.
     """
 
     def __init__(
@@ -86,8 +93,8 @@ class PlantKernel:
 
     def _find(self) -> None:
         """Where the block lies, and how much scratch its calls need."""
-        self._address = native.address(self._block)
-        self._room: int = _room(self._address)
+        self.address = native.address(self._block)
+        self.room: int = _room(self.address)
 
     def transition(self, lower: Array, upper: Array, u: Array, T: float) -> Transition:
         """Of all states of a box over a time T.
@@ -99,9 +106,9 @@ class PlantKernel:
         """
         n, nw, _ = self._sizes
         result, told = np.empty(n * (n + nw + 6)), np.empty(8)
-        substeps = _transition(self._address, native.scratch(self._room), lower, upper, u, T, result, told)
+        substeps = _transition(self.address, native.scratch(self.room), lower, upper, u, T, result, told)
         if substeps < 0:
-            raise self._undecided(told)
+            raise self.undecided(told)
         square, E = result[: n * n].reshape(n, n), result[n * (n + 1) : n * (n + 1 + nw)].reshape(n, nw)
         R, *ends = result[n * (n + 1 + nw) :].reshape(5, n)
         return Transition(square, result[n * n : n * (n + 1)], E, R, Span(*ends[:2]), Span(*ends[2:]), substeps)
@@ -115,8 +122,8 @@ class PlantKernel:
             If it is not enclosed.
         """
         result, told = self._result()
-        if _output(self._address, native.scratch(self._room), lower, upper, u, result, told):
-            raise self._undecided(told, is_output=True)
+        if _output(self.address, native.scratch(self.room), lower, upper, u, result, told):
+            raise self.undecided(told, is_output=True)
         return self._linear(result)
 
     def measured(self, known: Span, y: Array, u: Array) -> tuple[Linearisation, Span]:
@@ -132,8 +139,8 @@ class PlantKernel:
         found, told = Linearisation.empty(*self._sizes, self._inputs), np.empty(8)
         left = Span(known.lower.copy(), known.upper.copy())
         n = self._sizes[0]
-        if _measured(self._address, native.scratch(self._room), *left, y, u, found.rows[n:], found.n, told):
-            raise self._undecided(told, is_output=True)
+        if _measured(self.address, native.scratch(self.room), *left, y, u, found.rows[n:], found.n, told):
+            raise self.undecided(told, is_output=True)
         return found, left
 
     def moved(self, at: Linearisation, known: Span, box: Span, u: Array, T: float) -> tuple[Linearisation, Span]:
@@ -148,14 +155,14 @@ class PlantKernel:
             As `transition`.
         """
         rows, left, told = at.rows.copy(), Span(box.lower.copy(), box.upper.copy()), np.empty(8)
-        if _moved(self._address, native.scratch(self._room), *known, *left, u, T, rows, told):
-            raise self._undecided(told)
+        if _moved(self.address, native.scratch(self.room), *known, *left, u, T, rows, told):
+            raise self.undecided(told)
         return Linearisation(rows, at.n, at.nu), left
 
     def cut(self, known: Span, y: Array, output: LinearOutput) -> Span | None:
         """What readings leave of a box for which an output holds; None where nothing is left: a program decides."""
         left, result = Span(known.lower.copy(), known.upper.copy()), np.concatenate([part.ravel() for part in output])
-        return left if _cut(self._address, native.scratch(self._room), *left, y, result) else None
+        return left if _cut(self.address, native.scratch(self.room), *left, y, result) else None
 
     def _result(self) -> tuple[Array, Array]:
         n, nw, ny = self._sizes
@@ -168,7 +175,8 @@ class PlantKernel:
 
     # -- why there is none ---------------------------------------------------------------------------
 
-    def _undecided(self, told: Array, is_output: bool = False) -> Undecided:
+    def undecided(self, told: Array, is_output: bool = False) -> Undecided:
+        """What the core tells (8,) of a transition, or of an output, that it has not found."""
         found = _Outcome(*told[:5].view(np.int64).tolist(), *told[5:].tolist())
         row, state = found.row, self._flow.states
         if is_output:

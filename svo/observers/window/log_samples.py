@@ -9,7 +9,6 @@ import numpy as np
 from svo.checks import Array
 from svo.logs.log import Log
 from svo.models.normal_form import NormalForm
-from svo.observers.window.sample import Sample
 
 _ORDINARY = 2.0**200  # of a reading or an input, in normal form: larger ones are clipped, one by one
 
@@ -31,12 +30,6 @@ class LogSamples(NamedTuple):
     noise: Array
     w_lower: Array
     w_upper: Array
-
-    def one(self, i: int, given: Array) -> Sample:
-        """One of them, whose measurement was ``given`` in the user's units."""
-        at = i if len(self.stack) > 1 else 0
-        stack, noise, lower, upper = (array[at] for array in (self.stack, self.noise, self.w_lower, self.w_upper))
-        return Sample(self.u[i], self.u_next[i], self.y[i], stack, noise, lower, upper, given)
 
 
 def log_samples(form: NormalForm, log: Log, first: int, last: int, needs_next: bool) -> LogSamples | None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -30,6 +31,7 @@ from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
+from svo.observers.relinearised_kernel import NOT_MEASURED, NOT_MOVED, PlantSamples
 from svo.observers.saved_state import arrays_of, numbers
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_samples import LogSamples, log_samples
@@ -39,7 +41,7 @@ from svo.observers.window.sample import Outgrown, Sample, check_matrices
 from svo.observers.window.setup import arrival_of, needs_next_input, template_rows
 from svo.observers.window.stamped import Stamped
 from svo.observers.window.step import WindowStep
-from svo.observers.window.window import Prover, Window
+from svo.observers.window.window import Prover, Taken, Window
 
 _ROUNDED_UP = 8.0 * float(np.finfo(float).eps)
 _BLURRED = 1e-3  # of a reading's own width: the share of its slack by the width of the set from which a restart pays
@@ -404,21 +406,36 @@ class WindowObserver(Observer):
                 k += seen.samples
                 yield seen
 
-    def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | None:
+    def _samples_at_once(self, log: Log, first: int, count: int) -> LogSamples | PlantSamples | None:
         """Samples of a log for one call of the kernel; None where the next one needs more than that."""
-        gone = self._lost or self._alarm is not None or self._readings is not None or self._missing.any()
-        if gone or self._plant is not None or self._stamped is not None or log.keeps_its_times:
+        if self._lost or self._alarm is not None or self._recent is not None:
             return None
         last = min(first + min(count, self._window.takes_at_once), len(log))
+        if self._plant is not None:
+            return self._plant.samples(log, first, last, self._wants_next_input)
+        if self._readings is not None or self._missing.any() or self._stamped is not None or log.keeps_its_times:
+            return None
+        if self._normal.physical_range is not None:
+            return None
         return log_samples(self._form, log, first, last, self._wants_next_input)
 
-    def _seen_at_once(self, log: Log, first: int, samples: LogSamples, boxes: Array | None) -> Iterator[Seen]:
+    def _seen_at_once(
+        self, log: Log, first: int, samples: LogSamples | PlantSamples, boxes: Array | None
+    ) -> Iterator[Seen]:
         """Those that are consistent, then the one that is not, if there is one."""
         begun, last, stopped = perf_counter(), first + len(samples.y), self.stopped
         own = None if boxes is None else boxes[first:last]
-        done, told = self._window.take_many(samples, own)
-        if own is not None:
-            own[:done] *= self._form.x
+        if isinstance(samples, LogSamples):
+            done, told = self._window.take_many(samples, own)
+            if own is not None:
+                own[:done] *= self._form.x
+            conclude = partial(self._concluded, told)
+        else:
+            assert self._plant is not None
+            found = self._window.take_relinearised(self._plant, samples, own)
+            done = found.done
+            is_taken = found.end not in (NOT_MOVED, NOT_MEASURED)
+            conclude = partial(self._concluded, found.told) if is_taken else partial(self._unlinearised, found.why)
         if done:
             self._number += done
             self._schedule = log.schedule_at(first + done - 1)
@@ -426,12 +443,23 @@ class WindowObserver(Observer):
             yield Seen(done, replace(step, seconds=step.seconds / done))
         at = first + done
         if at < last:
-            sample = samples.one(done, log.y[at])
-            ended = lambda: self._window.concluded(told, sample.given)  # noqa: E731
-            step = self._ask(perf_counter(), log.schedule_at(at), lambda: self._said(self._outcome(sample, ended)))
+            step = self._ask(
+                perf_counter(), log.schedule_at(at), lambda: self._said(conclude(samples, done, log.y[at]))
+            )
             if not done:
                 object.__setattr__(step, "stopped", self.stopped - stopped)
             yield self._seen_alone(step, at, boxes)
+
+    def _concluded(self, told: Taken, samples: LogSamples | PlantSamples, i: int, y: Array) -> VerdictName:
+        """Of a sample of a log that the kernel has taken."""
+        sample = self._window.handed_over(y)
+        return self._outcome(sample, lambda: self._window.concluded(told, y))
+
+    def _unlinearised(self, why: Undecided | None, samples: PlantSamples, i: int, y: Array) -> VerdictName:
+        """Of a sample of a log whose transition, where that says why, or output the kernel has not linearised."""
+        if why is not None:
+            self._start_from_largest(why)
+        return self._take(self._sample(samples.u[i], samples.u_next[i], y, None, None), None)
 
     @staticmethod
     def _seen_alone(step: Step, k: int, boxes: Array | None) -> Seen:
@@ -477,13 +505,16 @@ class WindowObserver(Observer):
             lower, upper = self._newest_bounds(self._window)
             at = plant.moved(Span(lower[:n] * self._form.x, upper[:n] * self._form.x), u, dt)
         except Undecided as error:
-            box = plant.give_up(error, self._number)
-            self._adopt(
-                self._new_window(ArrivalSet.box(box.lower / self._form.x, box.upper / self._form.x), self._number)
-            )
-            self.largest_at = self._number
+            self._start_from_largest(error)
         else:
             self._window.move_by(self._normal.stack(at)[:, :n])
+
+    def _start_from_largest(self, why: Undecided) -> None:
+        """Nothing else is known of a sample to which there is no transition."""
+        assert self._plant is not None
+        box = self._plant.give_up(why, self._number)
+        self._adopt(self._new_window(ArrivalSet.box(box.lower / self._form.x, box.upper / self._form.x), self._number))
+        self.largest_at = self._number
 
     def _said(self, verdict: VerdictName) -> WindowStep:
         reason = (OUTGROWN if self._lost else self._window.reason) if verdict == "undecided" else None

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
+from svo.logs.log import Log
 from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
+from svo.observers.relinearised_kernel import NOT_MOVED, WITHOUT_ROOM, Carried, Followed, PlantSamples, follow
 from svo.observers.saved_state import numbers
 
 _MEASURED = ("C", "c", "F", "n")  # what a sample has without a transition
@@ -100,6 +102,38 @@ class Relinearised:
             output = model.output_near(*box, u, around)
             box = model.kernel.cut(box, y, output) or box
         return Linearisation.before(output, model.noise, model.n_inputs), box
+
+    # -- many samples at once --------------------------------------------------------------------------
+
+    def samples(self, log: Log, first: int, last: int, needs_next: bool) -> PlantSamples | None:
+        """Samples ``first`` to ``last`` - 1 of a log; None where the first needs more than one call of the core.
+
+        ``needs_next`` says whether the input of a sample itself counts.
+        """
+        model = self.model
+        fits = (log.u.shape[1], log.y.shape[1]) == (model.n_inputs, model.n_outputs)
+        if self.now is None or not 0 < first < last or log.schedule is not None or not fits:
+            return None
+        T = np.full(last - first, model.Ts)
+        if log.keeps_its_times:
+            if not model.continuous:
+                return None
+            T = np.diff(log.time[first - 1 : last])
+        u, y = np.ascontiguousarray(log.u[first - 1 : last]), np.ascontiguousarray(log.y[first:last])
+        if not np.isfinite(u).all() or np.isinf(y).any():
+            return None
+        return PlantSamples(u[:-1], u[1:] if needs_next else np.zeros((last - first, model.n_inputs)), y, T)
+
+    def follow(self, window: int, units: Array, samples: PlantSamples, eps: float, boxes: Array | None) -> Followed:
+        """`relinearised_kernel.follow`, from what is known of the newest sample."""
+        assert self.now is not None
+        carried = Carried(self.box, self.now, self.before or self.now)
+        array = carried.to_core()
+        found = follow(window, self.model.kernel, units, array, samples, eps, boxes)
+        if found.done or found.end not in (WITHOUT_ROOM, NOT_MOVED):
+            self.box, self.now, self.before = carried.read(array)
+            self.reason = None
+        return found
 
     # -- saved states ------------------------------------------------------------------------------------
 

@@ -20,12 +20,14 @@ from svo.observers import window_kernel as kernel
 from svo.observers.answers import NO_PROOF, OUT_OF_TIME, VerdictName
 from svo.observers.given_units import window_out
 from svo.observers.readings import OUTSIDE
+from svo.observers.relinearised_kernel import BOX_WITHOUT_ROOM, TAKEN, WITHOUT_ROOM, Followed, PlantSamples
 from svo.observers.saved_state import arrays_of, take_exactly
 from svo.observers.window.certificate import WindowCertificate, certificate_of
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.fallback import candidates, is_feasible
 from svo.observers.window.log_samples import LogSamples
 from svo.observers.window.memory import FIXED, Memory, WindowSettings
+from svo.observers.window.relinearised import Relinearised
 from svo.observers.window.sample import Outgrown, Sample, check_entry
 from svo.observers.window.sign_split import SplitCertificate, SplitPrograms
 
@@ -144,10 +146,29 @@ class Window:
         done, told = kernel.follow(memory.address, samples, eps, kernel.UNLIMITED, boxes)
         return done, memory.go_on(told, eps)
 
+    def take_relinearised(self, plant: Relinearised, samples: PlantSamples, boxes: Array | None) -> Followed:
+        """As `take_many`, of a nonlinear plant; the sample after them is not taken where it is not linearised."""
+        memory, eps, units, self.reason = self.memory, self.settings.eps, self.settings.plant_units, None
+        memory.check_whole()
+        done, end = 0, WITHOUT_ROOM
+        while end == WITHOUT_ROOM:
+            own = None if boxes is None else boxes[done:]
+            found = plant.follow(memory.address, units, samples.after(done), eps, own)
+            done, end = done + found.done, found.end
+            if end in (WITHOUT_ROOM, BOX_WITHOUT_ROOM):
+                memory.enlarge(2 * memory.size.K)
+        told = memory.go_on(found.told, eps) if end == TAKEN else found.told
+        return found._replace(done=done, told=told)
+
     @property
     def takes_at_once(self) -> int:
-        """How many samples `take_many` may be given; 0 where each is more than one call of the kernel."""
-        return self._room if self._takes_whole and self._model.physical_range is None else 0
+        """How many samples one call of the kernel may take; 0 where each is more than one."""
+        return self._room if self._takes_whole else 0
+
+    def handed_over(self, given: Array) -> Sample:
+        """The sample that the kernel was last given, whose measurement was ``given`` in the user's units."""
+        names = Sample._fields[:-1]
+        return Sample._make([*(self.memory.arrays[f"in_{name}"].copy() for name in names), given])
 
     def concluded(self, told: Taken, given: Array) -> VerdictName:
         """What the kernel told of a whole sample comes to, whose measurement was ``given`` in the user's units.
