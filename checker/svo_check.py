@@ -260,6 +260,8 @@ class Chain:
             expect(origin == "assumed", "no start of a known kind")
             found = Set.read(step["set"], model.n)
             box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
+            rows = zip(found.rows, *found.ends, strict=True)
+            box += "".join(f"; {row} x: {low:.6g} to {high:.6g}" for row, low, high in rows)
             premise = f"the state is in a set that is ASSUMED at sample {k} (left by others' models): {box}"
         self.start, self.template = (k, found.within(model.physical)), array(step["template"], None, model.n)
         more = {"the state never leaves the physical range of the model": model.physical is not None,
@@ -283,8 +285,7 @@ class Chain:
         gain = array(step["gain"], len(owner), model.rows)
         functional = array(step["functional"], len(owner), model.columns)
         for q in range(len(self.channels.get(k, [[]])[0])):
-            for side in (-1, 1):
-                self.s.pop((k, q, side), None)
+            self.s.pop((k, q, 1), None), self.s.pop((k, q, -1), None)
         self.channels[k] = owner, gain, functional, self._left_out(k, owner, gain, functional)
 
     def _left_out(self, k, owner, gain, functional):
@@ -359,10 +360,9 @@ class Chain:
                 if on_p:
                     products = [num(d) * num(s) for d in self._ends(k, q)[0] for s in self._ends(k, q)[1]]
                     total += on_p * (min(products) if on_p.m[0] > 0 else max(products))
-            if rest and weight:
+            for row, column in (entry for entry in rest if weight.m[entry[0]]):
                 reach = reach or self._reach(known, first, last)
-                for (row, column), size in rest.items():
-                    total -= Vec([abs(weight.m[row])], weight.e) * num(up(size * reach[i][column]))
+                total -= Vec([abs(weight.m[row])], weight.e) * num(up(rest[row, column] * reach[i][column]))
             if g[n : n + nu]:
                 total += g[n : n + nu].dot(Vec.of(self.log.u[k]))
             total += g[n + nu : n + nu + 1]
@@ -386,7 +386,7 @@ class Chain:
         for (row, end), (m,) in zip(where, array(step["sum"], len(where), 1) if where else [], strict=True):
             column, length, *ends = model.sums[count(row)]
             expect(first + length - 1 <= count(end) <= last, "a sum is not within its window")
-            total -= num(m) * num(ends[m > 0])
+            total -= num(m) * num(ends[m > 0] if column >= model.ny else -ends[m < 0])  # a row of outputs is of -v
             for k in range(end + 1 - length, end + 1):
                 noise, _, _, remainder = model.bounds(k)
                 if column < model.ny and math.isnan(self.log.y[k][column]):  # at most the noise

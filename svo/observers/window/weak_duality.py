@@ -102,11 +102,11 @@ class DualSum:
         for i, multiplier in enumerate(sums.on_sum):
             if not multiplier:
                 continue
-            m, column = rational(multiplier), int(sums.column[i])
-            self._bound(m, sums.lower[i], sums.upper[i])
+            m, column, ny = rational(multiplier), int(sums.column[i]), self.c.samples[0].y.size
+            ends = (sums.lower[i], sums.upper[i]) if column >= ny else (-sums.upper[i], -sums.lower[i])  # of -v
+            self._bound(m, *ends)
             for index in range(int(sums.first[i]) - self.c.first, int(sums.last[i]) - self.c.first + 1):
                 s = self.c.samples[index]
-                ny = s.y.size
                 if column < ny and np.isnan(s.y[column]):  # a term that is not there is at most the noise
                     self.total -= abs(m) * rational(s.noise[column])
                     continue

@@ -308,6 +308,14 @@ def test_the_checker_takes_sums_of_readings(
     assert claims(by_hand(tmp_path, y, False, [outside], 0, known)) == []
 
 
+@pytest.mark.parametrize(("lower", "upper", "holds"), [(-9.0, 0.3, True), (-0.3, 9.0, False)])
+def test_a_sum_of_noise_has_two_ends(tmp_path: Path, lower: float, upper: float, holds: bool) -> None:
+    """The noise is what a reading has more than its output, 0.4 at least over the three samples."""
+    alarm = alarm_of(2, 0.0, 0.0, 0.0) | {"on_sum": [[0, 2]], "sum": {"shape": [1, 1], "hex": "-0x1.0p+0"}}
+    sums = [{"column": 0, "samples": 3, "ends": {"shape": [2], "hex": f"{lower.hex()} {upper.hex()}"}}]
+    assert bool(claims(by_hand(tmp_path, [1.1, 1.3, 1.3], False, [alarm], 0, {"sums": sums}))) is holds
+
+
 @pytest.mark.parametrize(("bound", "holds"), [(0.05, True), (0.14, True), (0.16, False)])
 def test_the_checker_takes_sums_of_disturbances(tmp_path: Path, bound: float, holds: bool) -> None:
     # after two steps x is at most 1.2, or 1 + the bound of the sum; the reading says at least 1.15
@@ -339,6 +347,14 @@ def test_a_set_that_is_assumed_is_a_premise_that_is_printed(case: tuple[Files, i
     of_kind(steps, "start")[0]["from"] = "assumed"
     ((_, _, premises),) = claims((with_steps(case[0][0], steps), *case[0][1:]))
     assert "ASSUMED at sample 0 (left by others' models): -1 to 1" in premises[0]
+    zero = {"shape": [1], "hex": "0"}
+    row = {"rows": {"shape": [1, 1], "hex": "0x1.8p+0"}, "lower": zero, "upper": zero}
+    of_kind(steps, "start")[0]["set"] |= row
+    for step in steps[3:]:
+        if step.get("first") == 0:
+            step["on_start"] = zero
+    ((_, _, premises),) = claims((with_steps(case[0][0], steps), *case[0][1:]))
+    assert premises[0].endswith("-1 to 1; [1.5] x: 0 to 0")
 
 
 def mutated(steps: list[Any], rng: np.random.Generator) -> list[Any]:

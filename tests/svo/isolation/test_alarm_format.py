@@ -58,9 +58,9 @@ def still(
     )  # fmt: skip
 
 
-def one_sum(column: int, first: int, last: int, bound: float, m: float) -> SumRows:
+def one_sum(column: int, first: int, last: int, bound: float, m: float, lower: float | None = None) -> SumRows:
     ends = [np.array([k], dtype=np.int64) for k in (column, first, last)]
-    return SumRows(*ends, np.array([-bound]), np.array([bound]), np.array([m]))
+    return SumRows(*ends, np.array([-bound if lower is None else lower]), np.array([bound]), np.array([m]))
 
 
 @pytest.mark.parametrize(
@@ -118,21 +118,30 @@ def test_a_negative_remainder_proves_nothing() -> None:
     assert not still([0.9] * 4, one_sum(0, 0, 3, 1.0, -1.0), remainder=-0.1).verify()
 
 
+def test_a_sum_of_noise_has_a_lower_and_an_upper_end() -> None:
+    # v = y - x: readings of 0.9 about zero are noise of sum 3.6, which its upper end alone excludes
+    for lower, upper, proven in ((-9.0, 1.0, True), (-1.0, 9.0, False)):
+        assert still([0.9] * 4, one_sum(0, 0, 3, upper, -1.0, lower)).verify() is proven
+        assert still([-0.9] * 4, one_sum(0, 0, 3, -lower, 1.0, -upper)).verify() is proven
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_random_sums_prove_only_what_is_empty(seed: int) -> None:
     """Any multipliers: where they prove it, no noise within both kinds of bounds explains the readings."""
     rng = np.random.default_rng(seed)
     y = np.where(rng.random(5) < 0.2, np.nan, rng.uniform(-2.0, 2.0, 5))
-    first, bound = int(rng.integers(0, 3)), float(rng.uniform(0.2, 2.0))
+    first, lower, upper = int(rng.integers(0, 3)), float(-rng.uniform(0.2, 2.0)), float(rng.uniform(0.2, 2.0))
     last = int(rng.integers(first + 1, 5))
-    alarm = still(y.tolist(), one_sum(0, first, last, bound, float(rng.normal())), start=float(rng.uniform(-1, 1)))
+    row = one_sum(0, first, last, upper, float(rng.normal()), lower)
+    alarm = still(y.tolist(), row, start=float(rng.uniform(-1, 1)))
     singles = tuple(replace(s, on_output=rng.normal(0.0, 0.3, 1) * ~np.isnan(s.y)) for s in alarm.samples)
     alarm = replace(alarm, samples=singles)
     if alarm.verify():
         v = y - alarm.arrival.box_lower[0]
         inside = v[first : last + 1]
-        reach = bound + np.isnan(inside).sum()
-        assert np.nanmax(np.abs(v)) > 1.0 or abs(np.nansum(inside)) > reach
+        missing = np.isnan(inside).sum()
+        total = np.nansum(inside)
+        assert np.nanmax(np.abs(v)) > 1.0 or total > upper + missing or total < lower - missing
 
 
 # -- the record ------------------------------------------------------------------------------------------------------
