@@ -10,11 +10,14 @@ from numpy.typing import ArrayLike
 
 from polytopes import motion, projection, reduction, slicing
 from polytopes import support as support_functions
-from polytopes.affine_hull import hull_of, made_explicit
+from polytopes.affine_hull import explicit, hull_of, made_explicit
 from polytopes.affine_image import affine_image
 from polytopes.approximation import Bracketed, Copy
 from polytopes.checks import different_coordinates, real_array, real_number, whole_number
+from polytopes.enclosing_zonotope import enclosing_zonotope, principal_axes
+from polytopes.errors import EmptySetError, UnboundedError
 from polytopes.generators import rows_of_generators
+from polytopes.inner_template import inner_template
 from polytopes.intersection import rows_of_both
 from polytopes.largest_copy import largest_copy
 from polytopes.minkowski_sum import minkowski_sum
@@ -29,6 +32,7 @@ from polytopes.rows import Rows, a_set, dense, nothing, same_space
 from polytopes.shadow_within import bracket
 from polytopes.shape import Shape
 from polytopes.signatures import options_by_name
+from polytopes.zonotopes import ConstrainedZonotope
 
 
 class Constructions(Shape):
@@ -267,6 +271,73 @@ class Constructions(Shape):
         centre, scale = largest_copy(self, same_space(self, Q))
         copy = type(self)(*motion.scaled(Q, scale)).translate(centre)
         return Copy(copy, centre, scale)
+
+    def inner_template(self, directions: ArrayLike) -> Self:
+        """A set ``{x : T x <= h}`` in this bounded one, T being the directions (k, n): no larger h lies in it.
+
+        Proved to lie inside, in rationals.  From the largest copy of ``{x : T x <= |T|}`` (one linear program) each
+        face moves out as far as it goes, so that each alone is at its end to 1e-12 of the size; of all such sets it
+        need not have the largest volume.  Of a flat set within its equalities, which the result then has too.
+
+        Parameters
+        ----------
+        directions : array_like (k, n)
+            Rows that hold a set: those of a box, an octagon, of another set.
+
+        Raises
+        ------
+        ValueError
+            If sets of such rows are unbounded.
+        EmptySetError, UnboundedError
+            If there is no such set.
+        UndecidedError
+            If the set is too thin for floats.
+        """
+        normals = real_array("directions", directions, ("k", self.dim))
+        if not support_functions.known_nonempty(self):
+            raise EmptySetError("the empty set has no set inside; ask is_empty() first.")
+        if not self.is_bounded():
+            raise UnboundedError("P is unbounded, so no set inside is largest; intersect it with a box first.")
+        if self.affine_dim() == 0:
+            return type(self)(*explicit(self).table)
+        return type(self)(*inner_template(self, normals[normals.any(axis=1)]))
+
+    def enclosing_zonotope(self, generators: ArrayLike | str = "box") -> ConstrainedZonotope:
+        """A zonotope around a bounded set, its generators along those of a template; proved to contain it.
+
+        Parameters
+        ----------
+        generators : {"box", "principal"} or array_like (n, g)
+            "box": along the coordinates; "principal": along the principal axes of the vertices; or the columns of an
+            array of rank n.  With g = n it is the smallest parallelotope along them, by supports; with g > n the sum of
+            the lengths is least, by the vertices.  What has to be rounded is held by up to n more generators of the
+            size of the rounding.
+
+        Returns
+        -------
+        ConstrainedZonotope
+            Without constraints.
+
+        Raises
+        ------
+        EmptySetError, UnboundedError
+            If there is none.
+        ValueError
+            If the generators do not span the space.
+        UndecidedError
+            If g > n and the set has too many vertices for rationals.
+        """
+        if isinstance(generators, str):
+            if generators not in ("box", "principal"):
+                raise ValueError(f"generators is {generators!r}; expected 'box', 'principal' or an array (n, g).")
+            template = np.eye(self.dim) if generators == "box" else principal_axes(self)
+        else:
+            template = real_array("generators", generators, (self.dim, "g"), meaning="one row per coordinate")
+        lengths = np.linalg.norm(template, axis=0)
+        template, lengths = template[:, lengths > 0.0], lengths[lengths > 0.0]
+        if np.linalg.matrix_rank(template / lengths) < self.dim:
+            raise ValueError(f"generators span less than R^{self.dim}; expected columns that span it.")
+        return ConstrainedZonotope(*enclosing_zonotope(self, template))
 
     def outer_reduce(self, max_facets: int) -> Self:
         """A superset with at most `max_facets` inequalities, bounded if this set is.

@@ -102,18 +102,28 @@ class Questions(Rows):
         """
         return support_functions.bounding_box(self)
 
-    def inner_box(self) -> tuple[Floats, Floats]:
-        """A largest box inside a bounded set: lower (n,) and upper (n,); it satisfies the rows to rounding.
+    @options_by_name
+    def inner_box(self, *, by_volume: bool = False) -> tuple[Floats, Floats]:
+        """A largest box inside a bounded set: lower (n,) and upper (n,); it lies in the set, decided exactly.
 
-        First the largest one with the proportions of the bounding box (one linear program), then each face moved out
-        as far as it goes, so that no larger box contains it; of all boxes inside, it need not have the largest volume.
+        First the largest one with the proportions of the bounding box (one linear program), or that of largest volume,
+        then each face moved out as far as it goes, so that no larger box contains it.  In a set that is flat or thin
+        askew, where no box of floats is, it satisfies the rows to rounding.
+
+        Parameters
+        ----------
+        by_volume : bool
+            The box of largest volume, to some 1e-6 of it, by a convex program (cvxpy); over the coordinates that a flat
+            set leaves free.
 
         Raises
         ------
         EmptySetError, UnboundedError
             If there is no such box.
+        UndecidedError
+            If the convex program did not end.
         """
-        return inner_box(self)
+        return inner_box(self, by_volume)
 
     def chebyshev(self) -> Ball:
         """A largest ball in the set (within the affine set of the equalities): centre and radius, inf if unlimited.
