@@ -10,7 +10,9 @@ step that does not follow ends the check. Exit code 0: every chain is proven.
 
 import argparse
 import csv
+import gzip
 import hashlib
+import io
 import json
 import math
 import re
@@ -20,9 +22,18 @@ import zlib
 from pathlib import Path
 
 WORD = re.compile(r"-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf")
-CHUNK, MOST_UNPACKED, MOST_TIMES = 1 << 14, 64 << 20, 50  # bytes; times the size of the file
+MOST_UNPACKED, MOST_TIMES = 64 << 20, 50  # bytes; times the size of the file
 MOST_WORK = 1.5e9  # products of bits in one step
 SIDES = {"upper": 1, "lower": -1}
+STARTS = {
+    "first": "the first set of the model holds the state at sample 0",
+    "readings": "the model holds from sample {0} on, where the readings alone say where the state is",
+    "physical": "the model holds from sample {0} on, where the state is in its physical range",
+    "largest": "the largest set holds the state at sample {0}, where it started again",
+    "assumed": "the state is in a set that is ASSUMED at sample {0} (left by others' models): {1}",
+}
+READ_WITHIN = 1.125  # times the size of a box that readings prove: where they look for it
+NOTHING = {"shape": [0], "hex": ""}
 TOLERANCE = 0.0100000001  # of the sampling time, by which the times of a log may differ from it
 
 
@@ -31,7 +42,7 @@ class Wrong(ValueError):
 
 
 ERRORS = ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError
-REFUSALS = (*ERRORS, zlib.error)
+REFUSALS = (*ERRORS, EOFError, zlib.error)
 
 
 def expect(holds, why):
@@ -89,10 +100,6 @@ def up(value):
     return math.nextafter(value, math.inf)
 
 
-def sum_up(terms):  # at least the sum of products, each rounded; math.fsum itself rounds once
-    return up(math.fsum(map(up, terms)))
-
-
 def real(text):
     expect(isinstance(text, str) and WORD.fullmatch(text), f"expected a float in hexadecimal, found {str(text)[:40]!r}")
     return float.fromhex(text)
@@ -119,20 +126,13 @@ def count(value, least=0, end=2**53):
 
 def lines_of(path):
     """The lines of a file, packed or not, that are not blank."""
+    most = max(MOST_UNPACKED, MOST_TIMES * Path(path).stat().st_size)
     with open(path, "rb") as file:
-        waiting, parts, total = file.read(CHUNK), [], 0
-        most = max(MOST_UNPACKED, MOST_TIMES * Path(path).stat().st_size)
-        if waiting[:2] != b"\x1f\x8b":
-            waiting, parts = b"", [waiting, file.read()]
-        while waiting:
-            member, before = zlib.decompressobj(31), total
-            while waiting and not member.eof:
-                parts.append(member.decompress(waiting, 1 << 20))
-                total += len(parts[-1])
-                expect(total <= most, f"it unpacks to more than {most >> 20} MB")
-                waiting = (member.unused_data if member.eof else member.unconsumed_tail) or file.read(CHUNK)
-            expect(member.eof and total > before, "a gzip member is cut or empty")
-    return (line for line in b"".join(parts).split(b"\n") if line.strip())
+        is_packed = file.read(2) == b"\x1f\x8b"
+    with (gzip.open if is_packed else open)(path, "rb") as file:
+        content = file.read(most + 1)
+    expect(len(content) <= most, f"it unpacks to more than {most >> 20} MB")
+    return (line for line in io.BytesIO(content) if line.strip())
 
 
 class Log:
@@ -191,6 +191,8 @@ class Model:
         ranges = (record["physical"], record["largest"])
         self.physical, self.largest = (None if r is None else Set([array(end, n) for end in r]) for r in ranges)
         self.is_scheduled = self._points is not None or len(self._stacks) > 1
+        self.premises = ["the state never leaves the physical range of the model"] * (self.physical is not None)
+        self.premises += ["the model file has the right matrices of each sample: an AXIOM"] * self.is_scheduled
         self._known = {}
 
     def bounds(self, k):
@@ -223,60 +225,65 @@ class Model:
 class Chain:
     """What follows, step by step, about one observer's model."""
 
-    def __init__(self, model, log):
-        self.model, self.log, self.start, self.template, self.checked = model, log, None, [], 0
+    def __init__(self, model, log, claimed):
+        self.model, self.log, self.claimed, self.start, self.directions, self.checked = model, log, claimed, None, [], 0
         self.bounds, self.s, self.channels, self.premises = {}, {}, {}, []
 
     def take(self, step):
         kind = step["step"]
         if kind in ("start", "channels"):
             (self._start if kind == "start" else self._channels)(step)
-        elif kind == "s":
-            k, q, side = self._sample(step["sample"]), count(step["channel"]), SIDES[step["side"]]
-            self.s[k, q, side] = self._bounded(step, k, self.channels[k][2][q], side)
-        elif kind == "x":
-            k, row, side, n = self._sample(step["sample"]), count(step["row"]), SIDES[step["side"]], self.model.n
-            direction = [float(i == row) for i in range(n)] if row < n else self.template[row - n]
-            whole = direction + [0.0] * (self.model.columns - n)
-            self.bounds[k, row, side] = self._bounded(step, k, whole, side)
+        elif kind in ("s", "x"):
+            k, side, value = self._sample(step["sample"]), SIDES[step["side"]], real(step["value"])
+            which = count(step["channel" if kind == "s" else "row"])
+            self._bounded(step, value, k, (self.channels[k][2] if kind == "s" else self.directions)[which], side)
+            (self.s if kind == "s" else self.bounds)[k, which, side] = value
         else:
             expect(kind == "alarm", "no step of a known kind")
             expect(self._total(step).m[0] > 0, "the multipliers do not prove that the window is empty")
         self.checked += 1
 
-    def _sample(self, value):
-        return count(value, 0, len(self.log.time))
+    def _sample(self, value):  # nothing after the sample of the claim is used
+        return count(value, 0, self.claimed + 1)
 
     def _start(self, step):
         """Everything before is forgotten."""
-        k, origin, model = self._sample(step["sample"]), step["from"], self.model
-        if origin == "first":
-            expect(k == 0, "the first set is that of sample 0")
-            found, premise = model.first, "the first set of the model holds the state at sample 0"
-        elif origin == "largest":
-            expect(model.largest is not None, "the model has no largest set")
-            found, premise = model.largest, f"the largest set holds the state at sample {k}, where it started again"
+        k, kind, model = self._sample(step["sample"]), step["from"], self.model
+        expect(kind in STARTS and (k == 0 or kind != "first"), "no known start, or a first set after sample 0")
+        self.bounds, self.s, self.channels = {}, {}, {}
+        axes = [[float(i == j) for j in range(model.n)] for i in range(model.n)]
+        self.directions = axes + array(step["template"], None, model.n)
+        if kind in ("readings", "assumed"):
+            found = self._read(step, k) if kind == "readings" else Set.read(step["set"], model.n)
         else:
-            expect(origin == "assumed", "no start of a known kind")
-            found = Set.read(step["set"], model.n)
-            box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
-            rows = zip(found.rows, *found.ends, strict=True)
-            box += "".join(f"; {row} x: {low:.6g} to {high:.6g}" for row, low, high in rows)
-            premise = f"the state is in a set that is ASSUMED at sample {k} (left by others' models): {box}"
-        self.start, self.template = (k, found.within(model.physical)), array(step["template"], None, model.n)
-        more = {"the state never leaves the physical range of the model": model.physical is not None,
-                "the model file has the right matrices of each sample: an AXIOM": model.is_scheduled}  # fmt: skip
-        self.bounds, self.s, self.channels, self.premises = {}, {}, {}, [premise]
-        self.premises += [text for text in more if more[text]]
+            found = getattr(model, kind)
+        expect(found is not None, f"the model has no {kind} set")
+        self.start = k, found.within(model.physical)
+        box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
+        rows = zip(found.rows, *found.ends, strict=True)
+        box += "".join(f"; {row} x: {low:.6g} to {high:.6g}" for row, low, high in rows)
+        self.premises = [STARTS[kind].format(k, box), *model.premises]
+
+    def _read(self, step, k):
+        """The box that readings prove wherever x is: |x| <= t X with t > 1 implies |x| < t X, and |x| <= X the box."""
+        box = [array(step[end], self.model.n) for end in ("lower", "upper")]
+        wide = [up(READ_WITHIN * max(abs(low), abs(high))) for low, high in zip(*box, strict=True)]
+        self.start = k, Set([[-v for v in wide], wide])
+        for i, rows in enumerate(array(step["inverse"], self.model.n, None, self.model.ny)):
+            window = {"first": k, "last": k + len(rows) - 1, "on_start": NOTHING}
+            for end, side in zip(box, (-1, 1), strict=True):
+                self._bounded(window, end[i], k, self.directions[i], side, [[side * m for m in row] for row in rows])
+        return Set(box)
 
     def _set(self, k):
         """What is proven of the state at a sample; infinite ends where nothing is."""
         expect(self.start is not None and k >= self.start[0], "a step is about samples before its set starts")
         if k == self.start[0]:
             return self.start[1]
-        n, rows = self.model.n, len(self.template)
-        ends = [[self.bounds.get((k, row, side), side * math.inf) for row in range(n + rows)] for side in (-1, 1)]
-        return Set([end[:n] for end in ends], self.template, [end[n:] for end in ends]).within(self.model.physical)
+        n, rows = self.model.n, range(len(self.directions))
+        ends = [[self.bounds.get((k, row, side), side * math.inf) for row in rows] for side in (-1, 1)]
+        found = Set([end[:n] for end in ends], self.directions[n:], [end[n:] for end in ends])
+        return found.within(self.model.physical)
 
     def _channels(self, step):
         """Factors of the uncertainties at a sample; bounds of the s of other factors are none of these."""
@@ -284,7 +291,7 @@ class Chain:
         owner = [count(i, 1, 1 + len(model.delta)) for i in step["owner"]]
         gain = array(step["gain"], len(owner), model.rows)
         functional = array(step["functional"], len(owner), model.columns)
-        for q in range(len(self.channels.get(k, [[]])[0])):
+        for q in range(len(self._factors(k)[0])):
             self.s.pop((k, q, 1), None), self.s.pop((k, q, -1), None)
         self.channels[k] = owner, gain, functional, self._left_out(k, owner, gain, functional)
 
@@ -292,15 +299,13 @@ class Chain:
         """max |Delta| |stack - sum gain functional'|, entry by entry, rounded up, where it is not zero."""
         found = {}
         for item, ends in enumerate(self.model.delta, start=1):
-            mine = [q for q, i in enumerate(owner) if i == item]
             for i, row in enumerate(self.model.stack(k)[0][item]):
-                for j, entry in enumerate(row):
-                    rest = num(entry)
-                    for q in mine:
-                        if gain[q][i] and functional[q][j]:
-                            rest -= num(gain[q][i]) * num(functional[q][j])
-                    if rest:
-                        found[i, j] = up(found.get((i, j), 0.0) + up(above(rest) * max(map(abs, ends))))
+                rest = Vec.of(row)
+                for q in (q for q, of in enumerate(owner) if of == item and gain[q][i]):
+                    rest -= num(gain[q][i]) * Vec.of(functional[q])
+                for j in (j for j, m in enumerate(rest.m) if m):
+                    size = up(abs(rest.m[j] << max(rest.e, 0)) / (1 << max(-rest.e, 0)))
+                    found[i, j] = up(found.get((i, j), 0.0) + up(size * max(map(abs, ends))))
         return found
 
     def _factors(self, k):
@@ -309,21 +314,20 @@ class Chain:
             self.channels[k] = [], [], [], self._left_out(k, [], [], [])
         return self.channels[k]
 
-    def _bounded(self, step, k, direction, side):
-        """The value of a bound of direction'(x, u, 1, w) at a sample, once it is proven."""
-        value = real(step["value"])
-        proven = num(-1.0) * self._total(step, k, Vec.of([side * v for v in direction]))
-        expect(not num(side * value) < proven, f"a bound of sample {k} is not proven")
-        return value
+    def _bounded(self, step, value, k, direction, side, on_output=None):
+        """Whether direction'(x, u, 1, w) at a sample is at most, or at least, a value."""
+        whole = direction + [0.0] * (self.model.columns - len(direction))
+        total = self._total(step, k, Vec.of([side * v for v in whole]), on_output)
+        expect((total + num(side * value)).m[0] >= 0, f"a bound of sample {k} is not proven")
 
-    def _total(self, step, at=None, objective=None):
+    def _total(self, step, at=None, objective=None, on_output=None):
         """Least value of the multiplied rows less their bounds, and less the objective at a sample."""
         model = self.model
         n, nu = model.n, model.nu
         first, last = self._sample(step["first"]), self._sample(step["last"])
         length = last - first + 1
         expect(length > 0 and (at is None or first <= at <= last), "a window's samples are out of order")
-        on_output, lines = array(step["on_output"], length, model.ny), self._lines(step, length)
+        on_output, lines = on_output or array(step["on_output"], length, model.ny), self._lines(step, length)
         on_w = array(step["on_w"], length, len(model.w_rows)) if "on_w" in step else [[]] * length
         known, reach = self._set(first), None
         costate, bits, work = Vec([0] * n), 0, 0.0
@@ -400,7 +404,7 @@ class Chain:
         return total, found
 
     def _lines(self, step, length):
-        """Multipliers of lines, by index in the window and channel: side (1 above), multiplier, slope, intercept."""
+        """By index in the window and channel: side (1 above), multiplier, slope and intercept of lines."""
         found, where = {}, step.get("on_line", [])
         for (i, q, side), (m, *line) in zip(where, array(step["line"], len(where), 3) if where else [], strict=True):
             expect(count(i) < length and count(side) < 2 and m >= 0.0, "a multiplier of a line is none")
@@ -408,8 +412,9 @@ class Chain:
         return found
 
     def _ends(self, k, q):  # of Delta, and of s
-        expect((k, q, 1) in self.s and (k, q, -1) in self.s, f"s of a channel of sample {k} has no proven bounds")
-        return self.model.delta[self.channels[k][0][q] - 1], (self.s[k, q, -1], self.s[k, q, 1])
+        s = [self.s.get((k, q, side)) for side in (-1, 1)]
+        expect(None not in s, f"s of a channel of sample {k} has no proven bounds")
+        return self.model.delta[self.channels[k][0][q] - 1], s
 
     def _reach(self, known, first, last):
         """Bounds of |x|, |u|, 1, |w| at each sample of a window, in floats rounded up."""
@@ -423,10 +428,10 @@ class Chain:
                 ends = [self._ends(k, q) for q in range(len(owner))]
                 z = found[-1] + [up(max(abs(d * v) for d in delta for v in s)) for delta, s in ends]
                 rows = [[*self.model.stack(k)[0][0][i], *(g[i] for g in gain)] for i in range(self.model.n)]
-                x = [sum_up(abs(a) * b for a, b in zip(row, z, strict=True) if a) for row in rows]
+                x = [up(math.fsum(up(abs(a) * b) for a, b in zip(row, z, strict=True) if a)) for row in rows]
                 for (i, j), size in rest.items():
                     if i < len(x):
-                        x[i] = sum_up([x[i], size * found[-1][j]])
+                        x[i] = up(x[i] + up(size * found[-1][j]))
         return found
 
 
@@ -438,30 +443,24 @@ def over_box(g, low, high):  # least of g'x
     return total
 
 
-def above(number):  # a float that is not below its size
-    top = abs(number.m[0])
-    more = max(0, top.bit_length() - 53)
-    return up(math.ldexp(float((top >> more) + (more > 0)), number.e + more))
-
-
 def check(proof, plant, log):
     """Observer, sample and chain of every alarm of a proof."""
     steps = (json.loads(line) for line in lines_of(proof))
-    head, chain, claim, done = next(steps, {}), None, None, []
+    head, chain, done = next(steps, {}), None, []
     expect(head.get("format") == "svo-proof-1", "the proof is not of the format svo-proof-1")
     expect(all(head.get(key) == plant[key] for key in ("plant", "noise")), "the proof is of another plant or noise set")
     for step in steps:
         if step["step"] == "chain":
             expect(chain is None, "a chain ends without its alarm")
-            expect(step["observer"] in plant["observers"], "a chain is of an observer that the model does not have")
-            chain, claim = Chain(Model(plant["observers"][step["observer"]]), log), step
-            expect(log.time[chain._sample(step["sample"])] == real(step["time"]), "a chain's time is not its sample's")
+            observer, sample = step["observer"], count(step["sample"], 0, len(log.time))
+            expect(observer in plant["observers"], "a chain is of an observer that the model does not have")
+            expect(log.time[sample] == real(step["time"]), "a chain's time is not its sample's")
+            chain = Chain(Model(plant["observers"][observer]), log, sample)
             continue
         expect(chain is not None, "a step stands in no chain")
         chain.take(step)
         if step["step"] == "alarm":
-            expect(step["last"] == claim["sample"], "an alarm is about another sample than its chain says")
-            done.append((claim["observer"], claim["sample"], chain))
+            done.append((observer, chain.claimed, chain))
             chain = None
     expect(chain is None and done, "the proof has no alarm, or a chain without one")
     return done

@@ -28,7 +28,7 @@ def verify(
     ] = None,
     full: Annotated[
         Path | None,
-        typer.Option(metavar="LOG", help="Also prove every bound from the first sample of this log to each alarm."),
+        typer.Option(metavar="LOG", help="Also prove each alarm from the plant's model and this log alone."),
     ] = None,
     write_proof: Annotated[
         Path | None,
@@ -39,9 +39,8 @@ def verify(
     """Check every stored alarm: its digest, its proof in exact arithmetic, and its data if the log is given.
 
     A window's proof is conditional on the set of states at its start, and on the model that is stored with it; with a
-    log that is compared with the plant's. With --full the plant's observers are run
-    over the log again, and every bound from the first sample to the alarm is proven in exact arithmetic (some
-    seconds an alarm). The exit code is 1 if any alarm fails, and if there is none.
+    log that is compared with the plant's. With --full it is proven from the plant's model and the log alone, with
+    every bound that it takes. The exit code is 1 if any alarm fails, and if there is none.
 
     \b
     Example:

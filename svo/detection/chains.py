@@ -11,18 +11,19 @@ import numpy as np
 
 from svo.detection.bank_alarms import bank_of_source, digest_of_alarm, promises_of
 from svo.detection.proof_file import Chain
-from svo.isolation import GLOBAL, Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
+from svo.isolation import Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
 from svo.logs.drive import drive
 from svo.logs.log import Log
 from svo.models import ModelSample, UncertainModel
 from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
-from svo.observers.base import Certificate, Observer
+from svo.observers.base import Observer
+from svo.observers.given_units import arrival_out
 from svo.observers.window.certificate import OnWindow, WindowCertificate
-from svo.observers.window.chain import promises_of as promised
-from svo.observers.window.chain import prover_of, proving, start_of
+from svo.observers.window.chain_starts import Start
+from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
-from svo.observers.window.proof_steps import ProofSteps
+from svo.observers.window.prover import ChainProver, ProvenChain
 from svo.observers.window.setup import joint_rows
 from svo.plant import BankChoice, MonitoredPlant, with_bank
 from svo.plant.dialects import on_log
@@ -158,11 +159,11 @@ def _sample(observer: Observer, log: Log, k: int, last: int) -> ModelSample:
 
 
 def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[AlarmCheck]:
-    """Check every stored alarm and, if it holds, run its bank over the log again and prove every bound of its observer.
+    """Check every stored alarm and, if it holds, prove it from the plant's model and the log alone.
 
-    The observers are those of the plant's bank for the noise set and architecture that the alarm names, and the
-    alarm's model must be the plant's. An observer that starts during the run, as those of class II do, is
-    proven from the set that it starts from: a constant set as given, that of a global observer with its own proof.
+    The model is that of the plant's bank for the noise set and architecture that the alarm names, and must be the
+    alarm's. Of an observer that starts during the run, as those of class II do, the model is claimed to hold from
+    there on, and the set that it starts from is used where the readings do not do: as given.
     Bounds are proven over convex hulls; an alarm that only a split by signs gives fails, and the reason says so.
 
     Parameters
@@ -184,9 +185,9 @@ def with_chains(
     models: PlantModels,
     keep: Callable[[Chain], object] | None = None,
 ) -> list[AlarmCheck]:
-    """Checks of alarms that hold, each with what is proven of its observer's bounds.
+    """Checks of alarms that hold, each with what its proof from the model and the log is.
 
-    What holds is given to ``keep``, step by step, where it can be written.
+    What holds is given to ``keep``, step by step.
     """
     return [_with_chain(check, alarm, models, keep) for check, alarm in zip(checks, alarms, strict=True)]
 
@@ -195,73 +196,60 @@ def _with_chain(
     check: AlarmCheck, alarm: Alarm, models: PlantModels, keep: Callable[[Chain], object] | None
 ) -> AlarmCheck:
     begun = perf_counter()
-    steps = None if keep is None else ProofSteps()
-    ok, reason, (started, given) = _prove(models.bank(alarm), alarm, models.log(alarm), steps)
-    if ok and keep is not None and steps is not None:
-        if steps.missing is None:
-            keep(Chain(alarm, started, steps.steps, given))
-        else:
-            reason += f"; not in the proof file: {steps.missing}"
-    return replace(check, ok=ok, reason=reason, seconds=check.seconds + perf_counter() - begun)
+    found, reason = _prove(models, alarm)
+    if found is not None and keep is not None:
+        keep(Chain(alarm, found.steps))
+    return replace(check, ok=found is not None, reason=reason, seconds=check.seconds + perf_counter() - begun)
 
 
 _NOT_FROM_THE_FIRST = "bounds of {} are not proven from the first sample on; verify without --full"
-_FIRST: tuple[int, str | None] = (0, None)  # where a proof starts, and what its set there rests on
 
 
-def _prove(bank: Bank, alarm: Alarm, log: Log, steps: ProofSteps | None) -> tuple[bool, str, tuple[int, str | None]]:
-    """Whether an alarm is proven, in words, and where its proof starts."""
-    replaced: dict[str, WindowObserver] = {}
-    splits: dict[str, int] = {}
-    for name in (alarm.observer, *(n for n in bank.observers if n == GLOBAL)):
-        observer = bank.observers.get(name)
-        if not isinstance(observer, WindowObserver):
-            kind = "none of that name" if observer is None else f"a {type(observer).__name__}"
-            return _refused(f"only bounds of window observers can be proven; the plant's bank has {kind} for {name!r}")
-        if isinstance(observer.model, NonlinearModel):
-            return _refused(_NOT_FROM_THE_FIRST.format("a nonlinear model"))
-        if observer.jitter is not None:
-            return _refused(_NOT_FROM_THE_FIRST.format("a model with jitter"))
-        told = steps if name == alarm.observer else None
-        replaced[name], splits[name] = proving(observer, told), observer.sign_split
-    bank.exchange(replaced)
-    own = replaced[alarm.observer]
-    started, fell, proof = _replay(bank, alarm.observer, log)
-    if fell != alarm.sample:
-        found = "not falsified" if fell is None else f"falsified at sample {fell}"
-        split = " over convex hulls, not split by signs as the plant's is," if splits[alarm.observer] else ""
-        return _refused(f"run again over the log{split} the plant's observer is {found}")
-    provers = [prover_of(observer) for observer in replaced.values()]
-    unproven, bounds = [what for p in provers for what in p.unproven], sum(p.checked for p in provers)
-    if unproven:
-        return _refused(f"{len(unproven)} of {bounds} bounds are not proven, first: {unproven[0]}")
-    if steps is not None and isinstance(proof, WindowCertificate):
-        steps.alarm(own.current_window, proof)
-    again, promises = start_of(own, started), "".join(f" and {promise}" for promise in promised(own))
-    if again is not None:
-        return True, f"proven over {bounds} bounds, given {again}{promises}", (started, None)
-    if started == 0:
-        rests = promises.replace(" and", ", given", 1)
-        return True, f"proven from the first sample, over {bounds} bounds{rests}", _FIRST
-    given = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
-    reason = f"proven from its start at sample {started} over {bounds} bounds, given {given}{promises}"
-    return True, reason, (started, given)
+def _prove(models: PlantModels, alarm: Alarm) -> tuple[ProvenChain | None, str]:
+    """The proof of an alarm, and in words what it is or why there is none."""
+    bank, log = models.bank(alarm), models.log(alarm)
+    observer = bank.observers[alarm.observer]
+    if not isinstance(observer, WindowObserver):
+        return None, f"only bounds of window observers can be proven; {alarm.observer!r} is a {type(observer).__name__}"
+    if isinstance(observer.model, NonlinearModel):
+        return None, _NOT_FROM_THE_FIRST.format("a nonlinear model")
+    if observer.jitter is not None:
+        return None, _NOT_FROM_THE_FIRST.format("a model with jitter")
+    of, begun = ModelOnLog(observer.model, observer.first_set, log), _beginning(bank, alarm, log)
+    if begun is None:
+        where = f"at sample {alarm.sample}"
+        return None, f"run again over the log, the plant's bank does not ask its observer {alarm.observer!r} {where}"
+    since, start = begun
+    prover = ChainProver(of, since, start)
+    found = prover.prove(alarm.sample)
+    if found is None:
+        split = ", not split by signs as the plant's is" if observer.sign_split else ""
+        return None, prover.reason + split
+    over = f", over {found.bounds} bounds" if found.bounds else ""
+    given = f", given {' and '.join(found.given)}" if found.given else ""
+    return found, f"proven {found.start.begins}{over}{given}"
 
 
-def _refused(why: str) -> tuple[bool, str, tuple[int, str | None]]:
-    return False, why, _FIRST
+def _beginning(bank: Bank, alarm: Alarm, log: Log) -> tuple[int, Start | None] | None:
+    """The sample from which on the alarm's model is claimed to hold, and what set its observer had; None = never.
 
-
-def _replay(bank: Bank, name: str, log: Log) -> tuple[int, int | None, Certificate | None]:
-    """Sample at which the observer last started, that at which its model was declared falsified, and the proof."""
-    started, ran = 0, False
-    for verdict in drive(bank, log):
-        step = verdict.steps.get(name)
-        if step is not None and not ran:
-            started = verdict.sample
-        # One that fell and starts again begins with what it knows after this sample.
-        ran = step is not None and step.verdict != "falsified"
-        alive = name in verdict.alive if name != GLOBAL else verdict.state != "unexplained"
-        if not alive:
-            return started, verdict.sample, None if step is None else step.certificate
-    return started, None, None
+    Only where the observer may have begun later than at the first sample, the bank is run over the log again.
+    """
+    observer = bank.observers[alarm.observer]
+    assert isinstance(observer, WindowObserver)
+    first, proof = observer.first_set, _window_of(alarm)
+    if not bank.may_start_again and (proof is None or proof.largest_at is None):
+        return 0, Start("first", 0, first)
+    step = next(verdict for verdict in drive(bank, log) if verdict.sample == alarm.sample).steps.get(alarm.observer)
+    if step is None:
+        return None
+    since, window = alarm.sample - step.sample, observer.current_window
+    if window.proof is None or window.free:
+        return since, None  # it has begun again since, or has no set but that of its readings
+    own = arrival_out(window.anchor, window.settings.form)
+    if window.origin or observer.largest_at == 0:
+        return since, Start("largest", since + window.origin, own)
+    if since == 0:
+        return 0, Start("first", 0, first)
+    left_by = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
+    return since, Start("assumed", since, own, because=left_by)

@@ -16,7 +16,7 @@ from svo.logs.log import Log
 from svo.models import UncertainModel
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.observer import WindowObserver
-from svo.observers.window.proof_steps import encode_set, first_set
+from svo.observers.window.proof_steps import encode_set
 from svo.observers.window.setup import joint_rows
 from svo.plant import MonitoredPlant, OffersModels
 from svo.plant.dialects import on_log
@@ -101,7 +101,7 @@ def _described(name: str, observer: WindowObserver, model: UncertainModel, log: 
         "w_lower": encode_value(lower),
         "w_upper": encode_value(upper),
         "w_rows": {key: encode_value(value) for key, value in zip(("rows", "lower", "upper"), rows, strict=True)},
-        "first": encode_set(first_set(observer.current_window)),
+        "first": encode_set(observer.first_set),
         **{key: None if r is None else [encode_value(r.lower), encode_value(r.upper)] for key, r in ranges.items()},
     }
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from svo.isolation import Alarm
-from svo.observers.window.proof_steps import SAMPLES
 from svo.store import write_whole
 from svo.store.packed_lines import packed
 
@@ -21,18 +20,12 @@ class Chain(NamedTuple):
     Attributes
     ----------
     alarm : Alarm
-    started : int
-        The log's sample at which the observer last started.
     steps : list of dict
-        As `ProofSteps` has them: samples are counted from there.
-    assumed : str or None
-        What the set at that sample rests on; None: it is the first set of the model.
+        As `ProofSteps` has them.
     """
 
     alarm: Alarm
-    started: int
     steps: list[dict[str, Any]]
-    assumed: str | None
 
 
 def write_proof(path: Path, chains: Sequence[Chain]) -> None:
@@ -47,8 +40,4 @@ def write_proof(path: Path, chains: Sequence[Chain]) -> None:
 def _lines(chain: Chain) -> Iterator[dict[str, Any]]:
     alarm = chain.alarm
     yield {"step": "chain", "observer": alarm.observer, "sample": alarm.sample, "time": float(alarm.time).hex()}
-    for step in chain.steps:
-        moved = {key: step[key] + chain.started for key in SAMPLES if key in step}
-        if step["step"] == "start" and step["from"] == "first" and chain.assumed is not None:
-            moved |= {"from": "assumed", "because": chain.assumed}
-        yield step | moved
+    yield from chain.steps

@@ -114,8 +114,7 @@ def verify(
     log : Log or path, optional
         The log that stored alarms are of; a detection brings its own.
     full : bool
-        Also prove every bound from the first sample of the log to each alarm, by the plant's observers run over it
-        again (some seconds an alarm).
+        Also prove each alarm from the plant's model and the log alone, without the set that the record takes as given.
     plant : MonitoredPlant, optional
         The one that stored alarms are of; by default it is found by its name, a description beside them.
     write_proof : path, optional

@@ -83,7 +83,7 @@ class ArchitectureI(Bank):
         self._hull: Box | None = None
 
     @property
-    def _may_start_again(self) -> bool:
+    def may_start_again(self) -> bool:
         return self._logic.may_restart
 
     def _memory(self) -> dict[str, Array]:

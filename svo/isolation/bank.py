@@ -320,7 +320,7 @@ class Bank(Shown, ABC):
         """
         expect_log(log)
         self._check_log(log, start)
-        if self._may_start_again:
+        if self.may_start_again:
             for at, verdict in enumerate(drive(self, log, start=start), start=start):
                 for name, box in (boxes or {}).items():
                     if name in verdict.steps:
@@ -387,7 +387,7 @@ class Bank(Shown, ABC):
         """Take back what `_memory` gave."""
 
     @property
-    def _may_start_again(self) -> bool:
+    def may_start_again(self) -> bool:
         """Whether an observer may be started during a run, from the sets that others have at that sample."""
         return True
 

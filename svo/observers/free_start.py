@@ -63,14 +63,14 @@ def state_bounds(samples: Sequence[Reading], delta: Array, eps: float) -> tuple[
         None where the readings do not bound the state, or not as far as one inverse of O shows; infinite where floats
         end.
     """
-    inverse = _left_inverse(samples, delta)
+    inverse = left_inverse(samples, delta)
     if inverse is None:
         return None
     with ctx.workprec(_BITS):
         return _Enclosure(samples, delta, eps, inverse).bounds()
 
 
-def _left_inverse(samples: Sequence[Reading], delta: Array) -> list[Array] | None:
+def left_inverse(samples: Sequence[Reading], delta: Array) -> list[Array] | None:
     """Weighted least squares in floats, a block (n, ny) a sample, zero for missing sensors; None without full rank."""
     ny = samples[0].y.size
     n = samples[0].stack.shape[1] - ny
@@ -109,10 +109,10 @@ class _Enclosure:
     """One evaluation; arrays hold balls."""
 
     def __init__(self, samples: Sequence[Reading], delta: Array, eps: float, inverse: list[Array]) -> None:
-        self._samples, self._eps, self._inverse = samples, arb(eps), [_balls(L) for L in inverse]
+        self._samples, self._eps, self._inverse = samples, arb(eps), [balls(L) for L in inverse]
         self._ny = samples[0].y.size
         self._n = samples[0].stack.shape[1] - self._ny
-        lower, upper = _balls(delta).T
+        lower, upper = balls(delta).T
         self._middle, self._half = (lower + upper) / 2, (upper - lower) / 2
 
     def bounds(self) -> tuple[Array, Array] | None:
@@ -120,20 +120,20 @@ class _Enclosure:
         n = self._n
         centre, alpha, M = _zeros(n), _zeros(n), _zeros(n, n)
         costates = self._costates()
-        M = M + abs(_balls(np.eye(n)) - costates[0])
-        free, response, spread, share = _zeros(n), _balls(np.eye(n)), _zeros(n), _zeros(n, n)
+        M = M + abs(balls(np.eye(n)) - costates[0])
+        free, response, spread, share = _zeros(n), balls(np.eye(n)), _zeros(n), _zeros(n, n)
         for L, after, sample in zip(self._inverse, costates[1:], self._samples, strict=True):
             stack, known, uncertain, half = self._parts(sample, free, response, spread, share)
             A, C = stack[:n, :n], stack[n:, :n]
             E, F = np.vsplit(stack[:, stack.shape[1] - half.size :], [n])
             used = ~np.isnan(sample.y)
-            y = _balls(np.where(used, sample.y, 0.0))
+            y = balls(np.where(used, sample.y, 0.0))
             slack, growth = self._slack(sample, y, C, F, (free, response, spread, share), uncertain, known[n:])
             on_v = np.hstack([after, L])
             residual = y - C @ free - known[n:]
             residual[~used] = arb(0)
             centre = centre + L @ residual
-            alpha = alpha + abs(L) @ (_balls(sample.noise) + slack) + abs(after @ E + L @ F) @ half
+            alpha = alpha + abs(L) @ (balls(sample.noise) + slack) + abs(after @ E + L @ F) @ half
             alpha = alpha + abs(on_v) @ uncertain[0]
             M = M + abs(L) @ growth + abs(on_v) @ uncertain[1]
             free, response = A @ free + known[:n], A @ response
@@ -150,21 +150,21 @@ class _Enclosure:
         return costates[::-1]
 
     def _central(self, sample: Reading) -> Any:
-        stack = _balls(sample.stack[0])
+        stack = balls(sample.stack[0])
         for middle, item in zip(self._middle, sample.stack[1:], strict=True):
-            stack = stack + middle * _balls(item)
+            stack = stack + middle * balls(item)
         return stack
 
     def _parts(self, sample: Reading, free: Any, response: Any, spread: Any, share: Any) -> tuple[Any, Any, Any, Any]:
         """Central stack, what is known of both lines, bounds (alpha, M) of the uncertain part, half-widths of w."""
         n, nw = self._n, sample.w_lower.size
         stack = self._central(sample)
-        lower, upper = _balls(sample.w_lower), _balls(sample.w_upper)
+        lower, upper = balls(sample.w_lower), balls(sample.w_upper)
         half = (upper - lower) / 2
-        given = np.concatenate([_balls(sample.u), [arb(1)], (lower + upper) / 2])
+        given = np.concatenate([balls(sample.u), [arb(1)], (lower + upper) / 2])
         columns = stack.shape[1] - nw
         alpha, M = _zeros(len(stack)), _zeros(len(stack), n)
-        for d, item in zip(self._half, map(_balls, sample.stack[1:]), strict=True):
+        for d, item in zip(self._half, map(balls, sample.stack[1:]), strict=True):
             on_x = item[:, :n]
             alpha = alpha + d * (abs(on_x @ free + item[:, n:] @ given) + abs(on_x) @ spread)
             alpha = alpha + d * (abs(item[:, columns:]) @ half)
@@ -177,18 +177,18 @@ class _Enclosure:
         """Slack of the readings: a constant part and the share of |x|."""
         free, response, spread, share = state
         n, nu = self._n, sample.u.size
-        stack = _balls(sample.stack[0])[n:]
-        largest = _balls(np.maximum(np.abs(sample.w_lower), np.abs(sample.w_upper)))
-        size = abs(y) + abs(C) @ (abs(free) + spread) + abs(stack[:, n : n + nu]) @ abs(_balls(sample.u))
-        size = size + abs(known) + abs(stack[:, n + nu]) + abs(F) @ largest + _balls(sample.noise) + uncertain[0][n:]
+        stack = balls(sample.stack[0])[n:]
+        largest = balls(np.maximum(np.abs(sample.w_lower), np.abs(sample.w_upper)))
+        size = abs(y) + abs(C) @ (abs(free) + spread) + abs(stack[:, n : n + nu]) @ abs(balls(sample.u))
+        size = size + abs(known) + abs(stack[:, n + nu]) + abs(F) @ largest + balls(sample.noise) + uncertain[0][n:]
         growth = abs(C) @ (abs(response) + share) + uncertain[1][n:]
-        return _balls(sample.slack) + self._eps * size, self._eps * growth
+        return balls(sample.slack) + self._eps * size, self._eps * growth
 
 
 def _contraction(centre: Any, alpha: Any, M: Any) -> tuple[Array, Array] | None:
     """The box |x - centre| <= alpha + M |x| implies, by a z that M maps strictly inside."""
     known = abs(centre) + alpha
-    share, constant = _up(M), _up(known)
+    share, constant = balls_up(M), balls_up(known)
     n = len(constant)
     if not (np.isfinite(share).all() and np.isfinite(constant).all()):
         return np.full(n, -np.inf), np.full(n, np.inf)
@@ -199,15 +199,15 @@ def _contraction(centre: Any, alpha: Any, M: Any) -> tuple[Array, Array] | None:
         return None
     if not (np.isfinite(z).all() and (z > 0.0).all()):
         return None
-    inside = known + M @ _balls(z)
+    inside = known + M @ balls(z)
     if not all(bool(v < arb(float(limit))) for v, limit in zip(inside, z, strict=True)):
         return None
-    radius = alpha + M @ _balls(z)
-    upper = _up(centre + radius)
-    return -_up(radius - centre), upper
+    radius = alpha + M @ balls(z)
+    upper = balls_up(centre + radius)
+    return -balls_up(radius - centre), upper
 
 
-def _balls(array: NDArray[Any]) -> Any:
+def balls(array: NDArray[Any]) -> Any:
     """The same numbers, exactly, as balls."""
     flat = np.asarray(array, dtype=float)
     balls = np.empty(flat.shape, dtype=object)
@@ -216,10 +216,10 @@ def _balls(array: NDArray[Any]) -> Any:
 
 
 def _zeros(*shape: int) -> Any:
-    return _balls(np.zeros(shape))
+    return balls(np.zeros(shape))
 
 
-def _up(balls: Any) -> Array:
+def balls_up(balls: Any) -> Array:
     """Floats that are not smaller than anything in the balls."""
     array = np.asarray(balls, dtype=object)
     return np.array([ball_up(ball) for ball in array.ravel()]).reshape(array.shape)

@@ -38,14 +38,19 @@ def arrival_in(arrival: ArrivalSet, form: NormalForm) -> ArrivalSet:
     )
 
 
+def arrival_out(arrival: ArrivalSet, form: NormalForm) -> ArrivalSet:
+    """A set of first states in normal form, in the user's units."""
+    return replace(
+        arrival,
+        box_lower=arrival.box_lower * form.x,
+        box_upper=arrival.box_upper * form.x,
+        rows=arrival.rows / form.x,
+    )
+
+
 def window_out(c: WindowCertificate, form: NormalForm) -> WindowCertificate:
     """A proof about the model and the data as they were given."""
-    arrival = replace(
-        c.arrival,
-        box_lower=c.arrival.box_lower * form.x,
-        box_upper=c.arrival.box_upper * form.x,
-        rows=c.arrival.rows / form.x,
-    )
+    arrival = arrival_out(c.arrival, form)
     samples = tuple(_sample_out(s, form) for s in c.samples)
     out = replace(c, arrival=arrival, samples=samples, w_rows=c.w_rows / form.w, units=form.exponents)
     return with_channels(out)

@@ -29,7 +29,7 @@ from svo.observers.base import Observer, Seen, Step
 from svo.observers.data import relative_slack
 from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
-from svo.observers.given_units import arrival_in
+from svo.observers.given_units import arrival_in, arrival_out
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
 from svo.observers.relinearised_kernel import NOT_MEASURED, NOT_MOVED, PlantSamples
 from svo.observers.saved_state import arrays_of, numbers
@@ -41,7 +41,7 @@ from svo.observers.window.sample import Outgrown, Sample, check_matrices
 from svo.observers.window.setup import arrival_of, needs_next_input, template_rows
 from svo.observers.window.stamped import Stamped
 from svo.observers.window.step import WindowStep
-from svo.observers.window.window import Prover, Taken, Window
+from svo.observers.window.window import Taken, Window
 
 _ROUNDED_UP = 8.0 * float(np.finfo(float).eps)
 _BLURRED = 1e-3  # of a reading's own width: the share of its slack by the width of the set from which a restart pays
@@ -134,17 +134,15 @@ class WindowObserver(Observer):
         carrier: UncertainModel = model.carrier
         return carrier
 
-    def _configure(self, settings: WindowSettings, prover: Callable[[bool], Prover] | None = None) -> None:
-        """Settings, and what makes a prover of a window whose anchor follows from its readings, or does not."""
+    def _configure(self, settings: WindowSettings) -> None:
         self._settings, self._form = settings, settings.form
         self.horizon, self.eps, self.sign_split = settings.horizon, settings.eps, settings.sign_split
-        self._normal, self._make_prover = settings.form.model, prover
+        self._normal = settings.form.model
         self._wants_next_input = (
             needs_next_input(self._normal) or self.model.uses_input_in_output or self._recent is not None
         )
         if self._stamped is not None and settings.injection is not None:
             raise ValueError("jitter is given, and exact sensors read every disturbance; state a noise n above zero")
-        self.prover = None if prover is None else prover(False)
 
     @property
     def needs_next_input(self) -> bool:
@@ -192,17 +190,15 @@ class WindowObserver(Observer):
         """The window as it stands."""
         return self._window
 
-    def proving(self, prover: Callable[[bool], Prover]) -> WindowObserver:
-        """An observer with these settings and first set, before its first sample, whose bounds a prover is shown.
+    @property
+    def first_set(self) -> ArrivalSet:
+        """What the state was known to be in at the first sample."""
+        return arrival_out(self._initial, self._form)
 
-        Convex hulls are kept where this one splits by signs.
-        """
-        if self._plant is not None:
-            raise TypeError("the observer has a nonlinear model; a proof from its first sample on takes a linear one")
-        if self._stamped is not None:
-            raise TypeError("the observer's model has jitter; a proof from its first sample on takes exact stamps")
+    def afresh(self) -> WindowObserver:
+        """An observer with these settings and first set, before its first sample."""
         again = copy(self)
-        again._configure(replace(self._settings, sign_split=0), prover)
+        again._plan_for(self.model)
         again._forget()
         again._begin(self._initial)
         return again
@@ -232,7 +228,7 @@ class WindowObserver(Observer):
         self._lost, self._stopped = False, 0  # programs of windows before the present one
         self._readings: Readings | None = None  # of a set that is lost, or too wide
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)  # samples since each sensor was read
-        self._window = Window(self._settings, initial, prover=self.prover)
+        self._window = Window(self._settings, initial)
         lower, upper = initial.box_lower * self._form.x, initial.box_upper * self._form.x
         if self._plant is not None:
             self._plant.start_from(Span(lower, upper))
@@ -566,7 +562,7 @@ class WindowObserver(Observer):
         if self._stamped is not None:
             self._stamped.box = None
         self._stopped += self._window.stopped
-        self._window = Window(self._settings, self._window.anchor, prover=self.prover)
+        self._window = Window(self._settings, self._window.anchor)
 
     def _without_set(self, sample: Sample) -> VerdictName:
         if self._plant is not None:
@@ -583,13 +579,12 @@ class WindowObserver(Observer):
 
     def _new_window(self, anchor: ArrivalSet, origin: int, free: bool = False) -> Window:
         """Nothing before it is used any more; bounds by readings alone have been proven where they were found."""
-        prover = None if self._make_prover is None else self._make_prover(free)
-        return Window(self._settings, anchor, origin=origin, free=free, prover=prover)
+        return Window(self._settings, anchor, origin=origin, free=free)
 
     def _adopt(self, window: Window) -> None:
         """Go on with a window that has started again."""
         self._stopped += self._window.stopped
-        self._window, self.prover = window, window.prover
+        self._window = window
         self._lost, self._readings, self.largest_at = False, None, None
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)
 

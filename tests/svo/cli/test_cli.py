@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from svo.cli import app
 from svo.studies.isolation.store import StudyFolder
+from tests.svo.observers.long_chains import long_chains
 
 
 def svo(*arguments: str | Path) -> Any:
@@ -340,7 +341,7 @@ def test_the_whole_chain_is_proven(log: Path, tmp_path: Path) -> None:
     assert svo("detect", "tank", log, "--out", tmp_path).exit_code == 0
     result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
     assert result.exit_code == 0, result.output
-    assert all("proven from the first sample" in check["reason"] for check in json.loads(result.stdout))
+    assert all("proven from the readings since" in check["reason"] for check in json.loads(result.stdout))
     assert "leave --log out" in one_line(svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--log", log))
 
 
@@ -410,25 +411,25 @@ def test_the_chain_of_a_model_that_starts_late_is_proven_from_its_start(register
     result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
     assert result.exit_code == 0, result.output
     reasons = {check["observer"]: check["reason"] for check in json.loads(result.stdout)}
-    assert "proven from the first sample" in reasons["nominal"]
-    assert "proven from its start at sample" in reasons["gauge"]
+    assert "proven from the readings since sample" in reasons["nominal"]
+    assert "proven from sample" in reasons["gauge"]
     assert "given the global set" in reasons["gauge"]
 
 
 def test_a_bound_that_is_not_proven_fails_the_chain(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from svo.observers.window.chain import BoundProver
-    from svo.observers.window.window import Window
+    from svo.observers.window import prover
 
-    honest = BoundProver.arrival
+    honest = prover.BoundProver.arrival
 
-    def check_after_cheating(self: BoundProver, window: Window, program: int) -> None:
+    def check_after_cheating(self: prover.BoundProver, window: Any, program: int) -> None:
         if program == 0:
             window.memory.arrays["new_upper"][0] -= 1e-9
         honest(self, window, program)
 
     assert svo("detect", "tank", log, "--out", tmp_path).exit_code == 0
-    monkeypatch.setattr(BoundProver, "arrival", check_after_cheating)
-    result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
+    monkeypatch.setattr(prover.BoundProver, "arrival", check_after_cheating)
+    with long_chains():
+        result = svo("verify", tmp_path / "alarms.jsonl", "--full", log, "--json")
     assert result.exit_code == 1
     reasons = [check["reason"] for check in json.loads(result.stdout)]
     assert all("bounds are not proven, first: arrival bound 0" in reason for reason in reasons)

@@ -52,7 +52,7 @@ def test_the_largest_set_is_named_with_its_sample(tmp_path: Path) -> None:
     plain, full = checked(tmp_path, "largest = { lower = [-5.0], upper = [5.0] }", [1e4])
     words = "the largest set at sample 101, where the set started again"
     assert f"proven given the arrival set, and {words}" in plain
-    assert full.startswith("proven over ")
+    assert full.startswith("proven from sample 101")
     assert f"given {words}" in full
 
 
@@ -60,10 +60,10 @@ def test_the_largest_set_is_named_with_its_sample(tmp_path: Path) -> None:
 def test_readings_that_contradict_each_other_need_no_set(tmp_path: Path, after: list[float]) -> None:
     plain, full = checked(tmp_path, "", after)
     assert "the readings of its window alone" in plain
-    assert "given nothing before sample 103, from which on the readings alone bound the state" in full
+    assert full == "proven from the readings since sample 100"
 
 
 def test_the_physical_range_is_named(tmp_path: Path) -> None:
     _, full = checked(tmp_path, "physical = { lower = [-20.0], upper = [20.0] }", [1e7])
-    assert full.startswith("proven from the first sample, over ")
+    assert full == "proven from sample 99, given the physical range"
     assert full.endswith("given the physical range")

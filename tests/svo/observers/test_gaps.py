@@ -251,7 +251,7 @@ def test_the_physical_range_is_a_premise_of_the_chain() -> None:
     assert steps[-1].verdict == "falsified"
     chain = prove_chain(observer, log)
     assert chain.proven
-    assert chain.given == ("the first set", "the physical range")
+    assert chain.given == ("the physical range",)
 
 
 def test_data_outside_the_physical_range_are_no_alarm_without_a_proof() -> None:

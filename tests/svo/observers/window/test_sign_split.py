@@ -177,7 +177,11 @@ def test_a_chain_is_proven_over_hulls_or_says_that_it_would_need_the_split(
     write_alarms(tmp_path / "alarms.jsonl", alarms)
     (check,) = verify_chains(tmp_path / "alarms.jsonl", log, plant)  # type: ignore[arg-type]
     assert check.ok == (sample is not None)
-    words = "proven from the first sample" if check.ok else "over convex hulls, not split by signs as the plant's is"
+    words = (
+        "proven from the first sample"
+        if check.ok
+        else "over convex hulls is falsified, not split by signs as the plant's is"
+    )
     assert words in check.reason
 
 
