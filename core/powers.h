@@ -44,4 +44,29 @@ static inline double next_down(double value) { return -next_up(-value); }
 
 static inline double power_of_two(integer power) { return times_power(1.0, power); }
 
+static const double MOST_UNITS = 0x1p51; /* beyond, a number has no digits to drop */
+
+/* The largest power of two that is at most a step; 0 where that is none, or anything. */
+static inline double unit_within(double step)
+{
+    return step > 0.0 && step < INFINITY ? power_of_two(exponent_of(step) - 1) : 0.0;
+}
+
+/* Of a number >= 0 the least multiple of a unit that is not below it; the number itself without a unit. */
+static inline double multiple_above(double value, double unit)
+{
+    const double units = value / unit;
+    return units < MOST_UNITS ? ceil(units) * unit : value;
+}
+
+/* Of any number the nearest multiple of a unit, or one as near. */
+static inline double multiple_near(double value, double unit)
+{
+    const double units = value / unit;
+    return fabs(units) < MOST_UNITS ? floor(units + 0.5) * unit : value;
+}
+
+/* A number >= 0 rounded up to 14 binary digits. */
+static inline double short_above(double value) { return multiple_above(value, unit_within(0x1p-13 * value)); }
+
 #endif

@@ -1,6 +1,7 @@
 /* A measurement over a box of states: h(x, w, u) in C x + c + F w + [-R, R], and what it leaves of the box. */
 #include "tape/plant.h"
 
+#include "powers.h"
 #include "vectors.h"
 
 static const double BLUNT = 1e-3;     /* of the noise: a remainder beyond is worth a linearisation over what is left */
@@ -125,15 +126,17 @@ EXPORTED integer fdi_plant_cut(const double *block, double *scratch, double *low
     return 1;
 }
 
-/* Into the rows [C, 0, c, F, 0] of a sample's linearisation, whose zeros are there; and the noise with the remainder. */
-static void give_rows(const plant *p, const output *o, double *rows, double *noise)
+/* Into the rows [C, 0, c, F, 0] of a sample's linearisation, whose zeros are there, of an output over the box x in few
+ * digits; and the noise with the remainder. */
+static void give_rows(const plant *p, const output *o, span x, double *rows, double *noise)
 {
     const integer n = p->n, nw = p->nw, at = n + p->nu;
     for (integer i = 0; i < p->ny; i++, rows += at + 1 + nw + n) {
+        shorten_row(p, x, o->C + i * n, o->F + i * nw, o->c + i, o->R + i);
         copy(rows, o->C + i * n, n);
         rows[at] = o->c[i];
         copy(rows + at + 1, o->F + i * nw, nw);
-        noise[i] = (p->noise[i] + o->R[i]) * (1.0 + 4.0 * ROUNDING);
+        noise[i] = multiple_above((p->noise[i] + o->R[i]) * (1.0 + 4.0 * ROUNDING), unit_within(0x1p-8 * o->R[i]));
     }
 }
 
@@ -153,10 +156,11 @@ EXPORTED integer fdi_plant_measured(const double *block, double *scratch, double
     fill(before, INFINITY, p.ny);
     for (integer again = 0; again < CUTS; again++) {
         if (!take_output(&p, &o, found)) return 1;
+        span_copy(p.before, p.z, p.n);
         if (!cut_by_readings(&p, &o, y)) break;
         span_copy(known, p.z, p.n);
         if (!is_worth_another(&p, &o, before)) break;
     }
-    give_rows(&p, &o, rows, noise);
+    give_rows(&p, &o, p.before, rows, noise);
     return 0;
 }

@@ -62,6 +62,9 @@ void cut_by_physical(const plant *p, span x);
 typedef struct { double low, high; } ends;
 ends rates_at_faces(const plant *p, integer i);
 
+/* A row A x + E w + a within R over a box of states and w, in fewer digits. */
+void shorten_row(const plant *p, span x, double *A, double *E, double *a, double *R);
+
 /* A box (in z) that holds x(t) within a time h from `before` on, and the forms of f over it; 0 if none is found. */
 int plant_enclose(plant *p, double h, outcome *found);
 

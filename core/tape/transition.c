@@ -393,11 +393,12 @@ static int take(plant *p, double T, transition *t, transition *other, transition
     return 1;
 }
 
-/* Into the rows [A, 0, a, E, diag R] of a sample's linearisation, whose zeros are there. */
+/* Into the rows [A, 0, a, E, diag R] of a sample's linearisation, whose zeros are there, in few digits. */
 static void give_rows(const plant *p, const transition *t, double *rows)
 {
     const integer n = p->n, nw = p->nw, at = n + p->nu;
     for (integer i = 0; i < n; i++, rows += at + 1 + nw + n) {
+        shorten_row(p, t->start, t->A + i * n, t->E + i * nw, t->a + i, t->R + i);
         copy(rows, t->A + i * n, n);
         rows[at] = t->a[i];
         copy(rows + at + 1, t->E + i * nw, nw);

@@ -1,6 +1,8 @@
 /* Rows of the window: scaled, with the states eliminated, widened by what the elimination can round. */
 #include "window.h"
 
+#include "powers.h"
+
 /* Bounds of row i of the sample in slot s, about the free response and widened by the rounding of its state. */
 void place_row(const window *w, integer i, integer s)
 {
@@ -111,7 +113,7 @@ void measure_sensor(const window *w, const double *psi, integer k, integer o, do
             magnitude += fabs(m[n + j] * u[j]);
         }
     if (w->late) add_variables(w, k, r, i, &known, &magnitude);
-    const double slack = eps * magnitude, width = noise + slack + (w->late ? left_out(w, k, r) : 0.0);
+    const double slack = short_above(eps * magnitude), width = noise + slack + (w->late ? left_out(w, k, r) : 0.0);
     w->slack[s * ny + o] = slack;
     w->raw_lower[i] = y - known - width;
     w->raw_upper[i] = y - known + width;

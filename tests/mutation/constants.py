@@ -120,6 +120,7 @@ CONSTANTS = (
             "tape/form_of_angle.c": ("NO_DIRECTION",),
             "tape/enclosure.c": ("WORTHWHILE",),
             "tape/transition.c": ("WORTH_ANOTHER",),
+            "tape/short_rows.c": ("DROPPED",),
             "tape/output.c": ("BLUNT", "WORTHWHILE"),
             "tape/matrix_exponential.c": ("LAST",),
             "window/factors.c": ("LEFT_OVER", "TOO_MUCH"),
