@@ -25,7 +25,7 @@ from svo.models.model import UncertainModel
 
 _SLACK = 1e-6  # of the factor: room for rounding in the proof
 _ENDED = 1e-9  # of the width of a set along a row: by so much it may break it where a search ends
-_INWARD = (1e-11, 1e-9, 1e-7)  # of its terms: how far a row moves inward where rounding left no proof
+_INWARD = 1e-11  # of its terms: how far a row moves inward where rounding left no proof; then 1e2 and 1e4 times
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def largest_invariant_set(
     found = _iterated(constraint, known, most, 0.0)
     if found.status != "undecided" or found.steps == most:
         return found
-    for part in _INWARD:
+    for part in (_INWARD, 1e2 * _INWARD, 1e4 * _INWARD):
         again = _iterated(found.set, known, most - found.steps, part)
         if again.status == "invariant":
             reason = f"proved in rationals; rows were moved inward by {part:g} of their terms"
