@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes import native
-from polytopes.native import Address, Entries, Given, Integer
+from polytopes.native import Address, Entries, Given, Integer, Real
 from svo.checks import Array
 from svo.functions.operations import Op
 
@@ -31,6 +31,8 @@ _interval = native.function("fdi_tape_interval", Integer, Given, Entries, return
 _room = native.function("fdi_tape_room", Address, returns=Integer)
 _ranges = native.function("fdi_tape_ranges", Address, Address, Given, Given, *[Entries] * 3, returns=Integer)
 _forms = native.function("fdi_tape_forms", Address, Address, Given, Given, *[Entries] * 4, returns=Integer)
+_integrate_room = native.function("fdi_tape_integrate_room", Address, returns=Integer)
+_integrate = native.function("fdi_tape_integrate", Address, Address, Entries, *[Given] * 3, Real, Integer)
 
 
 class NotEnclosed(ArithmeticError):
@@ -133,7 +135,7 @@ class Block:
     def __init__(self, content: Array, rows: int, free: int) -> None:
         self.content, self.rows, self.free = content, rows, free
         self._address = native.address(content)
-        self._room: int = max(1, _room(self._address))
+        self._room: int = max(1, _room(self._address), _integrate_room(self._address))
 
     def __reduce__(self) -> tuple[Callable[..., Block], tuple[Array, int, int]]:
         return Block, (self.content, self.rows, self.free)
@@ -166,3 +168,12 @@ class Block:
         centre, reach = box
         k, *ends = values.T.copy()
         return Forms(centre, reach, k, g, *ends)
+
+    def integrated(self, x: Array, held: Array, lower: Array, upper: Array, T: float, steps: int) -> Array:
+        """x (rows,) after a time T, by Runge and Kutta's method of fourth order in floats.
+
+        The rows are dx/dt at (x, held), x within the bounds (rows,).
+        """
+        moved = np.array(x, dtype=np.float64)
+        _integrate(self._address, native.scratch(self._room), moved, held, lower, upper, T, steps)
+        return moved

@@ -74,19 +74,13 @@ def advanced(
 
 def integrated(flow: Flow, x: Array, w: Array, u: Array, T: float, substeps: int) -> Array:
     """x(T) by Runge and Kutta's method of fourth order, for states (..., n) with their own w (..., nw)."""
-    h, inputs = T / substeps, np.broadcast_to(u, (*x.shape[:-1], len(u)))
-
-    def slope(at: Array) -> Array:
-        if flow.physical is not None:  # a stage may be a rounding beyond a face
-            at = np.clip(at, flow.physical.lower, flow.physical.upper)
-        return flow.tape.values(np.concatenate([at, w, inputs], axis=-1))
-
-    for _ in range(substeps):
-        k1 = slope(x)
-        k2 = slope(x + 0.5 * h * k1)
-        k3 = slope(x + 0.5 * h * k2)
-        x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + slope(x + h * k3))
-    return x
+    block, physical = flow.tape.block(0), flow.physical  # a stage may be a rounding beyond a face
+    everywhere: Array = np.full(flow.n, np.inf)
+    lower, upper = (-everywhere, everywhere) if physical is None else (physical.lower, physical.upper)
+    others, moved = np.broadcast_to(w, (*x.shape[:-1], w.shape[-1])), np.empty(x.shape)
+    for at in np.ndindex(x.shape[:-1]):
+        moved[at] = block.integrated(x[at], np.concatenate([others[at], u]), lower, upper, T, substeps)
+    return moved
 
 
 def _check(flow: Flow, x: Array, sample: int) -> None:
