@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,20 +10,20 @@ from polytopes import native
 from polytopes.native import Address, Entries, Given, Integer, Real
 from svo.checks import Array
 from svo.models import NormalForm
-from svo.models.nonlinear import Linearisation, Span, Undecided
+from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
 from svo.models.nonlinear.plant_kernel import PlantKernel
 from svo.observers.window_kernel import UNLIMITED, told
 
 _follow = native.function(
-    "fdi_relinearised_follow", *[Address] * 2, Given, Entries, Address, Integer, *[Address] * 4, Real, Integer,
-    Address, *[Entries] * 2, returns=Integer,
+    "fdi_relinearised_follow", *[Address] * 2, Given, *[Address] * 2, Integer, *[Given] * 4, Real, Integer, Address,
+    *[Entries] * 2, returns=Integer,
 )  # fmt: skip
 
 TAKEN, WITHOUT_ROOM, BOX_WITHOUT_ROOM, NOT_MOVED, NOT_MEASURED = range(5)  # as in `core/relinearised/follow.c`
 
 
 class PlantSamples(NamedTuple):
-    """Samples of a log, in the user's units, as C-contiguous floats.
+    """Samples that follow each other, in the user's units.
 
     Attributes
     ----------
@@ -64,8 +64,12 @@ class Followed(NamedTuple):
     why: Undecided | None
 
 
-class Carried(NamedTuple):
-    """What is carried from sample to sample besides the window.
+class Carried:
+    """What is carried from sample to sample besides the window, where the core changes it.
+
+    Parameters
+    ----------
+    model : NonlinearModel
 
     Attributes
     ----------
@@ -73,23 +77,31 @@ class Carried(NamedTuple):
         Of the newest state.
     now, before : Linearisation
         Of the newest sample, without a transition, and of the one before it.
+    address : int
     """
 
-    box: Span
-    now: Linearisation
-    before: Linearisation
+    def __init__(self, model: NonlinearModel) -> None:
+        n, ny = model.n_states, model.n_outputs
+        rows = n + ny, model.n_inputs + 1 + model.carrier.n_disturbances + n
+        self._shape, self._nu = rows, model.n_inputs
+        size = rows[0] * rows[1]
+        self._lengths = [n, n, size, ny, size, ny, 4 * n + size]  # the last: scratch
+        self._block = np.zeros(sum(self._lengths))
+        self._find()
 
-    def to_core(self) -> Array:
-        """In the order of the core, with the scratch that it needs."""
-        rows, n = self.now.rows.ravel(), len(self.box.lower)
-        room = np.empty(4 * n + rows.size)
-        return np.concatenate([*self.box, rows, self.now.n, self.before.rows.ravel(), self.before.n, room])
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("_shape", "_nu", "_lengths", "_block")}
 
-    def read(self, given: Array) -> Carried:
-        """The same from what the core has left."""
-        n, size = len(self.box.lower), self.now.rows.size + len(self.now.n)
-        now, before = (self.now.read(given[2 * n + at : 2 * n + at + size]) for at in (0, size))
-        return Carried(Span(given[:n].copy(), given[n : 2 * n].copy()), now, before)
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__ |= state
+        self._find()
+
+    def _find(self) -> None:
+        self.address = native.address(self._block)
+        low, high, now, now_noise, before, noise, _ = np.split(self._block, np.cumsum(self._lengths[:-1]))
+        self.box = Span(low, high)
+        self.now = Linearisation(now.reshape(self._shape), now_noise, self._nu)
+        self.before = Linearisation(before.reshape(self._shape), noise, self._nu)
 
 
 def units_of(form: NormalForm) -> Array:
@@ -106,7 +118,7 @@ def follow(
     window: int,
     plant: PlantKernel,
     units: Array,
-    carried: Array,
+    carried: Carried,
     samples: PlantSamples,
     eps: float,
     boxes: Array | None,
@@ -118,19 +130,19 @@ def follow(
     window : int
         Address of its block.
     plant : PlantKernel
-    units, carried : arrays
-        As `units_of` and `Carried.to_core` give them; what is carried is changed.
+    units : array
+        As `units_of` gives it.
+    carried : Carried
     samples : PlantSamples
     eps : float
         As of the window.
     boxes : (k, 2, n) array, optional
         Filled with the boxes of the samples that are consistent.
     """
-    result, why = np.zeros(2, dtype=np.int64), np.zeros(8)
-    data, to_boxes = (native.address(array) for array in samples), None if boxes is None else native.address(boxes)
+    result, why, count = np.zeros(2, dtype=np.int64), np.zeros(8), len(samples.T)
     done = _follow(
-        window, plant.address, units, carried, native.scratch(plant.room), len(samples.T), *data, eps, UNLIMITED,
-        to_boxes, result, why,
+        window, plant.address, units, carried.address, native.scratch(plant.room), count, *samples, eps, UNLIMITED,
+        None if boxes is None else native.address(boxes), result, why,
     )  # fmt: skip
-    end = int(result[0])
-    return Followed(int(done), end, told(int(result[1])), plant.undecided(why) if end == NOT_MOVED else None)
+    end, of_next = result.tolist()
+    return Followed(done, end, told(of_next), plant.undecided(why) if end == NOT_MOVED else None)

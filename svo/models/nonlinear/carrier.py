@@ -57,10 +57,9 @@ class Linearisation(NamedTuple):
         F = np.hstack([output.F, np.zeros_like(output.C)])
         return cls.measured(output.C, output.c, F, (noise + output.R) * (1.0 + 2.0**-50), nu)
 
-    def read(self, given: Array) -> Linearisation:
-        """Another of the same sizes, from its rows and its noise one after the other."""
-        rows, n = np.split(given, [self.rows.size])
-        return Linearisation(rows.reshape(self.rows.shape).copy(), n.copy(), self.nu)
+    def copy(self) -> Linearisation:
+        """One that stays as it is."""
+        return Linearisation(self.rows.copy(), self.n.copy(), self.nu)
 
     @property
     def stack(self) -> Array:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from svo.checks import Array
 from svo.models import NormalForm
 from svo.observers import window_kernel as kernel
-from svo.observers.relinearised_kernel import units_of
 from svo.observers.window.output_injection import OutputInjection, can_inject
 from svo.observers.window.sample import Sample
 from svo.observers.window.setup import channel_owners, disturbance_rows, jitter, output_is_disturbed
@@ -73,11 +72,6 @@ class WindowSettings:
     def output_is_disturbed(self) -> bool:
         """Whether w and channels enter the output, so that they take part at their own sample."""
         return output_is_disturbed(self.form.model)
-
-    @cached_property
-    def plant_units(self) -> Array:
-        """What the core needs of the normal form where it linearises a nonlinear plant."""
-        return units_of(self.form)
 
     @cached_property
     def injection(self) -> OutputInjection | None:

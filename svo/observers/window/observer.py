@@ -31,7 +31,7 @@ from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in, arrival_out
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
-from svo.observers.relinearised_kernel import NOT_MEASURED, NOT_MOVED, PlantSamples
+from svo.observers.relinearised_kernel import NOT_MEASURED, NOT_MOVED, Followed, PlantSamples
 from svo.observers.saved_state import arrays_of, numbers
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_samples import LogSamples, log_samples
@@ -138,6 +138,8 @@ class WindowObserver(Observer):
         self._settings, self._form = settings, settings.form
         self.horizon, self.eps, self.sign_split = settings.horizon, settings.eps, settings.sign_split
         self._normal = settings.form.model
+        if self._plant is not None:
+            self._plant.connect(settings.form)
         self._wants_next_input = (
             needs_next_input(self._normal) or self.model.uses_input_in_output or self._recent is not None
         )
@@ -157,7 +159,8 @@ class WindowObserver(Observer):
     def linearised(self) -> tuple[Linearisation | None, Linearisation | None]:
         """Of a nonlinear model: the linear models of the sample before the newest one, with the transition from it,
         and of the newest one, which has none yet; None before there are such samples."""
-        return (None, None) if self._plant is None else (self._plant.before, self._plant.now)
+        pair = (None, None) if self._plant is None else (self._plant.before, self._plant.now)
+        return tuple(None if at is None else at.copy() for at in pair)  # type: ignore[return-value]
 
     @property
     def stopped(self) -> int:
@@ -253,6 +256,8 @@ class WindowObserver(Observer):
         recent = None if self._recent is None else self._recent.moved(u, dt or self.Ts)
         around = None if recent is None else recent.around(u_next, self._ahead)
         if self._plant is not None:
+            if recent is None and end is None and not self._lost and self._window.takes_at_once:
+                return self._said(self._relinearised(self._plant, self._plant.sample(u, u_next, y, dt)))
             self._relinearise(self._plant, u, dt)
         elif self._stamped is not None:
             lower, upper = self._newest_bounds(None if self._lost else self._window)
@@ -429,9 +434,7 @@ class WindowObserver(Observer):
         else:
             assert self._plant is not None
             found = self._window.take_relinearised(self._plant, samples, own)
-            done = found.done
-            is_taken = found.end not in (NOT_MOVED, NOT_MEASURED)
-            conclude = partial(self._concluded, found.told) if is_taken else partial(self._unlinearised, found.why)
+            done, conclude = found.done, partial(self._of_next, found)
         if done:
             self._number += done
             self._schedule = log.schedule_at(first + done - 1)
@@ -447,15 +450,22 @@ class WindowObserver(Observer):
             yield self._seen_alone(step, at, boxes)
 
     def _concluded(self, told: Taken, samples: LogSamples | PlantSamples, i: int, y: Array) -> VerdictName:
-        """Of a sample of a log that the kernel has taken."""
+        """Of sample i, which the kernel has taken."""
         sample = self._window.handed_over(y)
         return self._outcome(sample, lambda: self._window.concluded(told, y))
 
-    def _unlinearised(self, why: Undecided | None, samples: PlantSamples, i: int, y: Array) -> VerdictName:
-        """Of a sample of a log whose transition, where that says why, or output the kernel has not linearised."""
-        if why is not None:
-            self._start_from_largest(why)
+    def _of_next(self, found: Followed, samples: PlantSamples, i: int, y: Array) -> VerdictName:
+        """Of sample i of a nonlinear plant, which is not simply consistent."""
+        if found.end not in (NOT_MOVED, NOT_MEASURED):
+            return self._concluded(found.told, samples, i, y)
+        if found.why is not None:
+            self._start_from_largest(found.why)
         return self._take(self._sample(samples.u[i], samples.u_next[i], y, None, None), None)
+
+    def _relinearised(self, plant: Relinearised, samples: PlantSamples) -> VerdictName:
+        """The verdict at the next sample of a nonlinear plant."""
+        found = self._window.take_relinearised(plant, samples, None)
+        return "consistent" if found.done else self._of_next(found, samples, 0, samples.y[0])
 
     @staticmethod
     def _seen_alone(step: Step, k: int, boxes: Array | None) -> Seen:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from svo.checks import Array
 from svo.logs.log import Log
+from svo.models import NormalForm
 from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
-from svo.observers.relinearised_kernel import NOT_MOVED, WITHOUT_ROOM, Carried, Followed, PlantSamples, follow
+from svo.observers.relinearised_kernel import NOT_MOVED, WITHOUT_ROOM, Carried, Followed, PlantSamples, follow, units_of
 from svo.observers.saved_state import numbers
 
 _MEASURED = ("C", "c", "F", "n")  # what a sample has without a transition
@@ -42,15 +43,35 @@ class Relinearised:
 
     def __init__(self, model: NonlinearModel) -> None:
         self.model, self.reason = model, None
+        self._carried = Carried(model)
+        self._has_now = self._has_before = False
         self.start_from(Span(model.start_range.lower, model.start_range.upper))
-        self.now: Linearisation | None = None
-        self.before: Linearisation | None = None
 
     reason: str | None
 
+    @property
+    def box(self) -> Span:
+        return self._carried.box
+
+    @property
+    def now(self) -> Linearisation | None:
+        return self._carried.now if self._has_now else None
+
+    @property
+    def before(self) -> Linearisation | None:
+        return self._carried.before if self._has_before else None
+
+    def connect(self, form: NormalForm) -> None:
+        """That of the window that takes the samples."""
+        self._units = units_of(form)
+
     def start_from(self, box: Span) -> None:
         """Nothing is known of the newest state but a box."""
-        self.box = box
+        self._carried.box.lower[:], self._carried.box.upper[:] = box
+
+    def _set_now(self, now: Linearisation) -> None:
+        self._carried.now.rows[:], self._carried.now.n[:] = now.rows, now.n
+        self._has_now = True
 
     def moved(self, known: Span, u: Array, dt: float | None) -> Linearisation:
         """The newest sample with the transition from it, whose states are in a box that the window knows.
@@ -65,8 +86,11 @@ class Relinearised:
         self.reason = None
         assert self.now is not None
         kernel, T = self.model.kernel, dt or self.model.Ts
-        self.before, self.box = kernel.moved(self.now, known, self.box, u, T)
-        return self.before
+        found, box = kernel.moved(self.now, known, self.box, u, T)
+        self.start_from(box)
+        self._carried.before.rows[:], self._carried.before.n[:] = found.rows, found.n
+        self._has_before = True
+        return found
 
     def give_up(self, why: Undecided, sample: int) -> Span:
         """The box from which the set starts again where a transition to a sample is not enclosed."""
@@ -81,15 +105,14 @@ class Relinearised:
         """The newest sample without a transition, and its readings: none where the output is not enclosed."""
         model = self.model
         try:
-            if around is None:
-                self.now, self.box = model.kernel.measured(self.box, y, u)
-            else:
-                self.now, self.box = self._near(y, u, around)
+            now, box = model.kernel.measured(self.box, y, u) if around is None else self._near(y, u, around)
+            self.start_from(box)
         except Undecided as error:
             self.reason = self.reason or f"{OUTSIDE_MODEL}: at sample {sample}, {error}"
             nothing = Linearisation.empty(model.n_states, len(model.flow.varying), len(y), model.n_inputs)
-            self.now, y = nothing._replace(n=model.noise), np.full(len(y), np.nan)
-        return self.now, y
+            now, y = nothing._replace(n=model.noise), np.full(len(y), np.nan)
+        self._set_now(now)
+        return now, y
 
     def _near(self, y: Array, u: Array, around: tuple[Array, Array]) -> tuple[Linearisation, Span]:
         """The sample where readings may be of other instants, about which inputs are within ``around``, and its box.
@@ -104,6 +127,10 @@ class Relinearised:
         return Linearisation.before(output, model.noise, model.n_inputs), box
 
     # -- many samples at once --------------------------------------------------------------------------
+
+    def sample(self, u: Array, u_next: Array, y: Array, dt: float | None) -> PlantSamples:
+        """One, ``dt`` seconds after the newest; None = the model's ``Ts``."""
+        return PlantSamples(u[None], u_next[None], y[None], np.full(1, dt or self.model.Ts))
 
     def samples(self, log: Log, first: int, last: int, needs_next: bool) -> PlantSamples | None:
         """Samples ``first`` to ``last`` - 1 of a log; None where the first needs more than one call of the core.
@@ -124,22 +151,18 @@ class Relinearised:
             return None
         return PlantSamples(u[:-1], u[1:] if needs_next else np.zeros((last - first, model.n_inputs)), y, T)
 
-    def follow(self, window: int, units: Array, samples: PlantSamples, eps: float, boxes: Array | None) -> Followed:
+    def follow(self, window: int, samples: PlantSamples, eps: float, boxes: Array | None) -> Followed:
         """`relinearised_kernel.follow`, from what is known of the newest sample."""
-        assert self.now is not None
-        carried = Carried(self.box, self.now, self.before or self.now)
-        array = carried.to_core()
-        found = follow(window, self.model.kernel, units, array, samples, eps, boxes)
+        found = follow(window, self.model.kernel, self._units, self._carried, samples, eps, boxes)
         if found.done or found.end not in (WITHOUT_ROOM, NOT_MOVED):
-            self.box, self.now, self.before = carried.read(array)
-            self.reason = None
+            self._has_before, self.reason = True, None
         return found
 
     # -- saved states ------------------------------------------------------------------------------------
 
     def state(self) -> dict[str, NDArray[Any]]:
         """What the next samples depend on, as named arrays."""
-        now = {} if self.now is None else {f"plant.{name}": getattr(self.now, name) for name in _MEASURED}
+        now = {} if self.now is None else {f"plant.{name}": getattr(self.now, name).copy() for name in _MEASURED}
         return {"plant.box": np.array(self.box), "plant.reason": np.array(self.reason or "")} | now
 
     def resume(self, state: Mapping[str, NDArray[Any]], has_samples: bool) -> None:
@@ -149,11 +172,12 @@ class Relinearised:
         box = Span(*numbers(state, "plant.box", 2, n))
         if not (box.lower <= box.upper).all():
             raise ValueError(f"plant.box is from {box.lower} to {box.upper}; expected a box")
-        self.box, self.now, self.reason = box, None, str(state["plant.reason"]) or None
+        self.start_from(box)
+        self._has_now, self.reason = False, str(state["plant.reason"]) or None
         if has_samples:
             shapes = zip(_MEASURED, ((ny, n), (ny,), (ny, columns), (ny,)), strict=True)
             parts = [numbers(state, f"plant.{name}", *shape) for name, shape in shapes]
             C, c, F, width = parts
-            self.now = Linearisation.measured(C, c, F, width, model.n_inputs)
-            if (self.now.n < model.noise).any():
+            self._set_now(Linearisation.measured(C, c, F, width, model.n_inputs))
+            if (width < model.noise).any():
                 raise ValueError("plant.n is below the noise of the model")

@@ -148,16 +148,17 @@ class Window:
 
     def take_relinearised(self, plant: Relinearised, samples: PlantSamples, boxes: Array | None) -> Followed:
         """As `take_many`, of a nonlinear plant; the sample after them is not taken where it is not linearised."""
-        memory, eps, units, self.reason = self.memory, self.settings.eps, self.settings.plant_units, None
+        memory, eps, self.reason = self.memory, self.settings.eps, None
         memory.check_whole()
         done, end = 0, WITHOUT_ROOM
         while end == WITHOUT_ROOM:
             own = None if boxes is None else boxes[done:]
-            found = plant.follow(memory.address, units, samples.after(done), eps, own)
+            found = plant.follow(memory.address, samples.after(done) if done else samples, eps, own)
             done, end = done + found.done, found.end
             if end in (WITHOUT_ROOM, BOX_WITHOUT_ROOM):
                 memory.enlarge(2 * memory.size.K)
         told = memory.go_on(found.told, eps) if end == TAKEN else found.told
+        self._given = samples.y[min(done, len(samples.y) - 1)]
         return found._replace(done=done, told=told)
 
     @property
