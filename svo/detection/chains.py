@@ -21,6 +21,7 @@ from svo.observers.base import Observer
 from svo.observers.given_units import arrival_out
 from svo.observers.window.certificate import OnWindow, WindowCertificate
 from svo.observers.window.chain_starts import Start
+from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
 from svo.observers.window.prover import ChainProver, ProvenChain
@@ -209,47 +210,45 @@ def _prove(models: PlantModels, alarm: Alarm) -> tuple[ProvenChain | None, str]:
     """The proof of an alarm, and in words what it is or why there is none."""
     bank, log = models.bank(alarm), models.log(alarm)
     observer = bank.observers[alarm.observer]
-    if not isinstance(observer, WindowObserver):
-        return None, f"only bounds of window observers can be proven; {alarm.observer!r} is a {type(observer).__name__}"
+    first = observer.first_set
+    if first is None:
+        return None, f"the observer {alarm.observer!r} ({type(observer).__name__}) does not say its first_set"
     if isinstance(observer.model, NonlinearModel):
         return None, _NOT_FROM_THE_FIRST.format("a nonlinear model")
     if observer.jitter is not None:
         return None, _NOT_FROM_THE_FIRST.format("a model with jitter")
-    of, begun = ModelOnLog(observer.model, observer.first_set, log), _beginning(bank, alarm, log)
+    begun = _beginning(bank, alarm, log, first)
     if begun is None:
         where = f"at sample {alarm.sample}"
         return None, f"run again over the log, the plant's bank does not ask its observer {alarm.observer!r} {where}"
-    since, start = begun
-    prover = ChainProver(of, since, start)
+    prover = ChainProver(ModelOnLog(observer.model, first, log), *begun)
     found = prover.prove(alarm.sample)
     if found is None:
-        split = ", not split by signs as the plant's is" if observer.sign_split else ""
-        return None, prover.reason + split
+        splits = isinstance(observer, WindowObserver) and observer.sign_split
+        return None, prover.reason + (", not split by signs as the plant's is" if splits else "")
     over = f", over {found.bounds} bounds" if found.bounds else ""
     given = f", given {' and '.join(found.given)}" if found.given else ""
     return found, f"proven {found.start.begins}{over}{given}"
 
 
-def _beginning(bank: Bank, alarm: Alarm, log: Log) -> tuple[int, Start | None] | None:
+def _beginning(bank: Bank, alarm: Alarm, log: Log, first: ArrivalSet) -> tuple[int, Start | None] | None:
     """The sample from which on the alarm's model is claimed to hold, and what set its observer had; None = never.
 
     Only where the observer may have begun later than at the first sample, the bank is run over the log again.
     """
     observer = bank.observers[alarm.observer]
-    assert isinstance(observer, WindowObserver)
-    first, proof = observer.first_set, _window_of(alarm)
-    if not bank.may_start_again and (proof is None or proof.largest_at is None):
+    if not bank.may_start_again and observer.model.start_range is None:
         return 0, Start("first", 0, first)
     step = next(verdict for verdict in drive(bank, log) if verdict.sample == alarm.sample).steps.get(alarm.observer)
     if step is None:
         return None
-    since, window = alarm.sample - step.sample, observer.current_window
-    if window.proof is None or window.free:
-        return since, None  # it has begun again since, or has no set but that of its readings
-    own = arrival_out(window.anchor, window.settings.form)
-    if window.origin or observer.largest_at == 0:
-        return since, Start("largest", since + window.origin, own)
+    since, largest, at = alarm.sample - step.sample, observer.model.start_range, observer.largest_at
+    if at is not None and at >= 0 and largest is not None:
+        return since, Start("largest", since + at, ArrivalSet.box(largest.lower, largest.upper))
     if since == 0:
         return 0, Start("first", 0, first)
+    if not (isinstance(observer, WindowObserver) and observer.current_window.is_given):
+        return since, None
+    own = arrival_out(observer.current_window.anchor, observer.current_window.settings.form)
     left_by = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
     return since, Start("assumed", since, own, because=left_by)

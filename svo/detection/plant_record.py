@@ -14,8 +14,10 @@ from svo.checks import Array
 from svo.isolation import Bank
 from svo.logs.log import Log
 from svo.models import UncertainModel
+from svo.models.intervals import has_own_intervals
 from svo.models.nonlinear import NonlinearModel
-from svo.observers.window.observer import WindowObserver
+from svo.observers.window.evidence import ArrivalSet
+from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.proof_steps import encode_set
 from svo.observers.window.setup import joint_rows
 from svo.plant import MonitoredPlant, OffersModels
@@ -47,12 +49,10 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
     names = {group: [c.name for c in getattr(columns, group)] for group in ("inputs", "outputs")}
     bank = (plant if log is None else on_log(plant, log)).bank(noise)
     if log is not None:
-        if log.keeps_its_times:
-            raise ValueError("the log keeps its own times, and transitions of other lengths are not described yet")
         log = scheduled(plant.scheduler(), log)
     observers = _observers(bank, log)
     if not observers:
-        why = f"plant {plant.name!r} has no window observer of a linear model, and no other is written yet"
+        why = f"plant {plant.name!r} has no observer of a linear model with exact stamps, and no other is written yet"
         raise ValueError(why + _other_models(plant))
     return {
         "format": FORMAT,
@@ -62,6 +62,7 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
         "columns": {"time": columns.time, **names},
         "samples": None if log is None else len(log),
         "observers": observers,
+        **({} if log is None or not log.keeps_its_times else {"intervals": encode_value(np.diff(log.time))}),
     }
 
 
@@ -74,15 +75,13 @@ def _other_models(plant: MonitoredPlant) -> str:
 
 def _observers(bank: Bank, log: Log | None) -> dict[str, Any]:
     return {
-        name: _described(name, observer, observer.model, log)
+        name: _described(name, observer.first_set, observer.model, log)
         for name, observer in bank.observers.items()
-        if isinstance(observer, WindowObserver)
-        and not isinstance(observer.model, NonlinearModel)
-        and observer.jitter is None
+        if observer.first_set is not None and not isinstance(observer.model, NonlinearModel) and observer.jitter is None
     }
 
 
-def _described(name: str, observer: WindowObserver, model: UncertainModel, log: Log | None) -> dict[str, Any]:
+def _described(name: str, first: ArrivalSet, model: UncertainModel, log: Log | None) -> dict[str, Any]:
     if model.is_scheduled and (log is None or log.schedule is None):
         raise ValueError(f"the model {name!r} is scheduled; give the log, whose scheduling values it is about")
     lower, upper, noise = _bounds(model, log)
@@ -95,13 +94,13 @@ def _described(name: str, observer: WindowObserver, model: UncertainModel, log: 
         "inputs": model.n_inputs,
         "outputs": model.n_outputs,
         "disturbances": model.n_disturbances,
-        "matrices": _matrices(model, log),
+        "matrices": _matrices(model, first, log),
         "delta": encode_value(delta),
         "noise": encode_value(noise),
         "w_lower": encode_value(lower),
         "w_upper": encode_value(upper),
         "w_rows": {key: encode_value(value) for key, value in zip(("rows", "lower", "upper"), rows, strict=True)},
-        "first": encode_set(observer.first_set),
+        "first": encode_set(first),
         **{key: None if r is None else [encode_value(r.lower), encode_value(r.upper)] for key, r in ranges.items()},
     }
 
@@ -114,12 +113,14 @@ def _bounds(model: UncertainModel, log: Log | None) -> tuple[Array, ...]:
     return tuple(bound[None] for bound in model.bounds(model.schedule))
 
 
-def _matrices(model: UncertainModel, log: Log | None) -> Mapping[str, Any]:
+def _matrices(model: UncertainModel, first: ArrivalSet, log: Log | None) -> Mapping[str, Any]:
     """The stack; a table with the scheduling values of a log; or the stack of each of its samples."""
-    if not model.is_scheduled or log is None or log.schedule is None:
+    own_times = log is not None and log.keeps_its_times and has_own_intervals(model)
+    if log is None or not (model.is_scheduled or own_times):
         return {"stacks": encode_value(model.stack()[None])}
     table = model.stack_table
-    if table is not None and log.schedule.ndim == 1:
+    if table is not None and not own_times and log.schedule is not None and log.schedule.ndim == 1:
         parts = {"points": table.points, "stacks": table.values, "schedule": log.schedule}
         return {key: encode_value(value) for key, value in parts.items()}
-    return {"stacks": encode_value(np.array([model.stack(log.schedule_at(k)) for k in range(len(log))]))}
+    of = ModelOnLog(model, first, log)
+    return {"stacks": encode_value(np.array([of.at(k).stack for k in range(len(log))]))}

@@ -39,6 +39,7 @@ from svo.observers.data import (
 from svo.observers.first_states import first_box
 from svo.observers.record import Record
 from svo.observers.saved_state import State, check_model, check_unchanged, last_schedule, sealed
+from svo.observers.window.evidence import ArrivalSet
 
 __all__ = ["Certificate", "Observer", "Record", "Seen", "Step", "VerdictName"]
 
@@ -78,6 +79,8 @@ class Observer(Shown, ABC):
         Whether its model may be a `NonlinearModel`.
     largest_at : int or None
         Sample at which the set last started from the model's largest set, if what is known now rests on it.
+    first_set : ArrivalSet or None
+        Of the state at its first sample, as it was given; a proof of its whole chain needs it.
     """
 
     kind: ClassVar[str] = "own"
@@ -91,6 +94,7 @@ class Observer(Shown, ABC):
 
     model: UncertainModel
     largest_at: int | None = None
+    first_set: ArrivalSet | None = None
     _number: int = -1
     _schedule: Any = None  # of the newest sample
     _ahead: tuple[Array, Array] | None = None  # bounds of the inputs that follow the sample of a hook soon

@@ -41,6 +41,7 @@ from svo.observers.polytope.vertex_images import transitions
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, OUTSIDE, TOO_LARGE
 from svo.observers.recursion import RecursiveObserver
 from svo.observers.saved_state import arrays_of, read_arrays
+from svo.observers.window.setup import arrival_of
 from svo.observers.window_kernel import LARGEST
 
 _PUBLISHED_STACKS = 4096
@@ -135,6 +136,7 @@ class PolytopeObserver(RecursiveObserver[Sample]):
     # -- the hooks -------------------------------------------------------------------------------
 
     def _reset(self, set: HPolytope, lower: Array, upper: Array) -> None:
+        self.first_set = arrival_of(set, lower, upper)
         self._begin_from(within_physical(self._normal.physical_range, set_in(set, self._form.x)))
 
     def _begin_from(self, initial: HPolytope) -> None:

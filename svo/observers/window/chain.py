@@ -105,6 +105,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
             )
     again, at, y = observer.afresh(), None, log.y.copy()
     first = again.first_set
+    assert first is not None  # it has not begun
     for k, step in enumerate(drive(again, log)):
         for measurement in waiting:
             if measurement.arrived == k and step.verdict != "falsified":

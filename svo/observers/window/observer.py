@@ -193,11 +193,6 @@ class WindowObserver(Observer):
         """The window as it stands."""
         return self._window
 
-    @property
-    def first_set(self) -> ArrivalSet:
-        """What the state was known to be in at the first sample."""
-        return arrival_out(self._initial, self._form)
-
     def afresh(self) -> WindowObserver:
         """An observer with these settings and first set, before its first sample."""
         again = copy(self)
@@ -227,7 +222,7 @@ class WindowObserver(Observer):
 
     def _begin(self, initial: ArrivalSet) -> None:
         """Nothing is known but a set of first states."""
-        self._initial = initial
+        self._initial, self.first_set = initial, arrival_out(initial, self._form)
         self._lost, self._stopped = False, 0  # programs of windows before the present one
         self._readings: Readings | None = None  # of a set that is lost, or too wide
         self._missing = np.zeros(self._normal.n_outputs, dtype=np.int64)  # samples since each sensor was read

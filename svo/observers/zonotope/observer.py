@@ -99,7 +99,8 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
     # -- the hooks -------------------------------------------------------------------------------
 
     def _reset(self, set: HPolytope, lower: Array, upper: Array) -> None:
-        self._begin_from(self._builder.first_set(arrival_in(arrival_of(set, lower, upper), self._form)))
+        self.first_set = arrival_of(set, lower, upper)
+        self._begin_from(self._builder.first_set(arrival_in(self.first_set, self._form)))
 
     def _begin_from(self, first: ConstrainedZonotope) -> None:
         """Nothing is known but a set of first states."""

@@ -29,6 +29,7 @@ class Made:
 
     name, noise_sets = "made", ("stated",)
     title = "made for a test"
+    kind: Any = WindowObserver
 
     def __init__(self, model: UncertainModel, schedule: Any = None, horizon: int = 5, **options: Any) -> None:
         self.model, self.Ts, self._schedule = model, model.Ts, schedule
@@ -43,7 +44,9 @@ class Made:
     def bank(self, noise: str) -> ArchitectureI:
         n = self.model.n_states
         start = HPolytope.box(-np.ones(n), np.ones(n))
-        return ArchitectureI(WindowObserver(self.model, start, horizon=self._horizon, **self._options), {})
+        if self.kind is WindowObserver:
+            return ArchitectureI(WindowObserver(self.model, start, horizon=self._horizon, **self._options), {})
+        return ArchitectureI(self.kind(self.model, start), {})
 
 
 def random_plant(seed: int) -> tuple[Made, Log]:
