@@ -526,7 +526,7 @@ def test_what_cannot_be_written_is_refused_with_its_reason(tmp_path: Path) -> No
         pytest.skip("there is no example of a nonlinear plant")
     done = CliRunner().invoke(app, ["describe", str(folder / "two_tanks.toml"), "--out", str(tmp_path / "plant.json")])
     assert done.exit_code == 1
-    assert "no window observer of a linear model" in done.output
+    assert "no observer of a linear model" in done.output
 
 
 def test_a_plant_with_other_models_is_told_them(tmp_path: Path) -> None:
