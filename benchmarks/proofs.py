@@ -1,8 +1,8 @@
 """Whole proofs of alarms: what ``svo verify --full`` and the independent checker take, and how many they prove.
 
 Run with ``python -m benchmarks.proofs --study elevator --flights 10 --out proofs.jsonl``. Flight k has seed k, and the
-faults of the plant in turn; each is written to the file when it is done, and the same command goes on after the last. ``--study random`` is a campaign of random plants, ``--flights`` of each kind of observer, with a fault of a size at
-which alarms are scarce.
+faults of the plant in turn; each is written to the file when it is done, and the same command goes on after the last.
+``--study random`` is a campaign of random plants through each kind of observer, with a drift that is found late.
 """
 
 from __future__ import annotations
