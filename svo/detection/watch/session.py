@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -17,7 +17,7 @@ from svo.checks import Array
 from svo.detection.bank_alarms import KEPT_SCHEDULES, alarm_of, source_of_bank
 from svo.detection.watch.lines import Line, Notice
 from svo.detection.watch.rows import RowReader
-from svo.detection.watch.timeline import Event, Row, Timeline
+from svo.detection.watch.timeline import Event, EventTimeline, Row, Timeline
 from svo.isolation import GLOBAL, Alarm, Verdict
 from svo.logs.dialect.live import check_live, live_widening
 from svo.logs.drive import advance
@@ -113,7 +113,8 @@ class Session:
         self.counts = Counts()
         self._notes: list[str] = []
         self._reader = RowReader(source, plant.columns, self._bad, dialect)
-        self._timeline = Timeline(plant.Ts, plant.columns.time)
+        self._keeps_times = dialect is not None and dialect.events
+        self._timeline = (EventTimeline if self._keeps_times else Timeline)(plant.Ts, plant.columns.time)
         self._samples = self._undecided = 0
         self._seconds = 0.0
         self._start()
@@ -124,7 +125,13 @@ class Session:
         """The first sample comes next."""
         self._bank = self.plant.bank(self.noise)
         self._scheduler = self.plant.scheduler()
+        if self._keeps_times and self._bank.jitter is not None and self.plant.columns.inputs:
+            raise ValueError(
+                '[log] states times = "events" and [model] jitter, and which input such a reading had is known only '
+                "afterwards; expected svo detect for the whole log"
+            )
         self._schedules: deque[Any] = deque(maxlen=KEPT_SCHEDULES)
+        self._times: deque[float] = deque(maxlen=KEPT_SCHEDULES)
         self._held: Array | None = None
         self._time = 0.0
         self._verdict: Verdict | None = None
@@ -209,6 +216,8 @@ class Session:
             arrays["held"] = self._held
         if all(isinstance(value, float) for value in self._schedules):
             arrays["schedules"] = np.array(self._schedules, dtype=np.float64)
+        if self._keeps_times:
+            arrays["times"] = np.array(self._times, dtype=np.float64)
         totals = {"samples": self._samples, "undecided": self._undecided, "seconds": self._seconds}
         rest = {"header": self._reader.state(), "timeline": self._timeline.state(), "counts": asdict(self.counts)}
         return arrays, {**totals, **rest, "time": self._time, "dead": self._dead}
@@ -225,6 +234,7 @@ class Session:
         resume_schedule(self._scheduler, _part(arrays, "schedule."))
         self._held = arrays.get("held")
         self._schedules.extend(arrays.get("schedules", np.zeros(0)).tolist())
+        self._times.extend(arrays.get("times", np.zeros(0)).tolist())
         self._samples, self._undecided = int(rest["samples"]), int(rest["undecided"])
         self._seconds, self._time = float(rest["seconds"]), float(rest["time"])
         self._dead = {str(name): float(time) for name, time in rest["dead"].items()}
@@ -264,9 +274,12 @@ class Session:
         if unknown.any():
             assert self._held is not None
             u = np.where(unknown, self._held, u)
-            self.counts.held += 1
+            self.counts.held += not self._keeps_times
+        is_unread = bool(np.isnan(row.y).all())
+        if self._keeps_times and is_unread and self._held is not None and np.array_equal(u, self._held):
+            return  # no event
         try:
-            yield self._sample(row.time, u, row.y, bool(np.isnan(row.y).all()))
+            yield self._sample(row.time, u, row.y, is_unread and not self._keeps_times)
         except ValueError as error:  # numbers beyond what a model can take
             self._bad(f"{row.place}: {error}")
             self._start_again(f"{row.place}: the bank refused the sample")
@@ -280,7 +293,9 @@ class Session:
         begun = perf_counter()
         schedule = schedule_of(self._scheduler, y, u)
         self._schedules.append(schedule)
-        verdict = advance(self._bank, self._held, y, u, schedule)
+        own = {} if self._held is None or not self._keeps_times else {"dt": time - self._time}
+        verdict = advance(self._bank, self._held, y, u, schedule, **own)
+        self._times.append(time)
         self._held, self._time, self._verdict = u, time, verdict
         self._samples += 1
         self.counts.missing += missing
@@ -300,7 +315,9 @@ class Session:
             if step is not None and step.certificate is not None and name not in alive and name not in self._dead:
                 proof, observer = step.certificate, self._bank.observers[name]
                 values = list(self._schedules)[-len(proof.samples) :]
-                new.append(alarm_of(name, verdict.sample, self._time, proof, origin, observer, values))
+                alarm = alarm_of(name, verdict.sample, self._time, proof, origin, observer, values)
+                times = list(self._times)[-len(proof.samples) :]
+                new.append(replace(alarm, dt=np.diff(times)) if self._keeps_times else alarm)
         self._dead |= {alarm.observer: alarm.time for alarm in new}
         return new
 

@@ -134,10 +134,14 @@ class Timeline:
         if steps == 0:
             yield from self._restart(row)
             return
-        if steps > 1:
-            yield Event("missing", row, steps - 1)
+        yield from self._gap(row, steps)
         self._remember(row)
         yield Event("sample", row)
+
+    def _gap(self, row: Row, steps: int) -> Iterator[Event]:
+        """The samples without a row before one that comes so many sampling times after the last."""
+        if steps > 1:
+            yield Event("missing", row, steps - 1)
 
     def _restart(self, row: Row) -> Iterator[Event]:
         """A new run; rows at its beginning that were taken for repeats of the old one are its first."""
@@ -174,3 +178,27 @@ class Timeline:
         assert self.last is not None
         where = f"{row.place}, column {self._column!r}"
         return Event("bad", row, why=str(wrong_step(where, self.last, row.time, self.Ts)))
+
+
+class EventTimeline(Timeline):
+    """As `Timeline`, of rows that come at times of their own: each later one is a sample, and there are no gaps.
+
+    One that comes long after the last waits for the next, which must be later still.
+    """
+
+    def _steps(self, before: float | None, after: float) -> int:
+        """0 for a row that is not later, 1 for one that is, 2 for one that comes long after."""
+        if before is None:
+            return 1
+        return 0 if after <= before else 1 if after - before <= _CONFIRMS * self.Ts else 2
+
+    def _gap(self, row: Row, steps: int) -> Iterator[Event]:
+        yield from ()
+
+    def _follows_echo(self, row: Row) -> bool:
+        return bool(self._echo) and row.time > self._echo[-1].time
+
+    def _bad(self, row: Row) -> Event:
+        assert self.last is not None
+        why = f"{row.place}, column {self._column!r}: the time is {row.time:.9g} s after {self.last:.9g} s"
+        return Event("bad", row, why=f"{why}; expected a later one, and the next row later still")

@@ -27,7 +27,6 @@ def check_live(dialect: Dialect) -> None:
         "long": dialect.long is not None,
         'order = "sort"': dialect.sort,
         "part": dialect.part is not None,
-        "times": dialect.events,
         "duplicates": dialect.duplicates != "error",
         "time.zone": dialect.time.zone is not None,
         "time.start": dialect.time.step is not None,

@@ -191,7 +191,7 @@ def _check_takes_events(top: Table, model: Model, faults: Mapping[str, FaultMode
     """Refuse times of their own for what takes only those of the sampling time."""
     log = top.table("log")
     if "interval_detector" in top:
-        raise log.error("times", 'is "events", and [interval_detector] is of samples of Ts; drop one of both')
+        raise log.error("times", 'is "events", and the gains of [interval_detector] are those of Ts; drop one of both')
     if not all(has_own_intervals(one) for one in (model, *(fault.model for fault in faults.values()))):
         raise log.error(
             "times", 'is "events", and a model is in discrete time, which has no other steps than Ts; state continuous '

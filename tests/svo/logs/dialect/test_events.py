@@ -213,7 +213,7 @@ def test_the_commands_read_events(tmp_path: Path) -> None:
     assert run_it(app, ["verify", f"{out}/alarms.jsonl", "--full", str(run)]).exit_code == 0
     refused = run_it(app, ["watch", toml, str(run / "encoder.csv"), "--until-end"])
     assert refused.exit_code != 0
-    assert "times" in refused.output
+    assert "columns.position.file" in refused.output
 
 
 def test_an_imported_log_of_events_is_one(tmp_path: Path) -> None:
