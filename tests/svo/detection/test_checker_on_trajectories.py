@@ -1,0 +1,153 @@
+"""What the checker of proofs makes of any multipliers holds on runs, in rationals, with every bound at a corner."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from fractions import Fraction
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from proof_cases import CHECKER
+
+SPEC = importlib.util.spec_from_file_location("svo_check_on_trajectories", CHECKER)
+assert SPEC is not None
+assert SPEC.loader is not None
+CHECK = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(CHECK)
+
+SAMPLES = 4
+
+
+def array(values: Any) -> dict[str, Any]:
+    values = np.asarray(values, float)
+    return {"shape": list(values.shape), "hex": " ".join(float(v).hex() for v in values.ravel())}
+
+
+class Trajectory:
+    """A plant of short dyadic numbers, and a run of it: all of it is in floats without rounding."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = rng = np.random.default_rng(seed)
+        self.least = -4 * int(rng.integers(2))  # where nothing is negative, bounds of sizes are reached too
+        self.n, self.nu, self.ny, self.nw, self.items, self.nh = (int(rng.integers(*r)) for r in
+            ((1, 3), (0, 2), (1, 3), (0, 3), (0, 3), (0, 2)))  # fmt: skip
+        self.columns = self.n + self.nu + 1 + self.nw
+        self.stacks = self.short(int(rng.choice([1, SAMPLES])), 1 + self.items, self.n + self.ny, self.columns)
+        self.delta = np.sort(self.short(self.items, 2))
+        self.w = self.short(SAMPLES, self.nw)
+        self.rows = self.short(self.nh, self.nw)
+        self.x, self.u = [self.short(self.n)], self.short(SAMPLES, self.nu)
+        self.noise, self.remainder = abs(self.short(SAMPLES, self.ny)), abs(self.short(1, self.ny))
+        self.v = self.noise * rng.choice([-1.0, 1.0, 0.5], self.noise.shape)
+        self.y = np.zeros((SAMPLES, self.ny))
+        self.z = []
+        for k in range(SAMPLES):
+            self.z.append(np.concatenate((self.x[k], self.u[k], [1.0], self.w[k])))
+            held = [rng.choice(ends) for ends in self.delta]
+            stack = self.stacks[min(k, len(self.stacks) - 1)]
+            after = (stack[0] + sum((d * s for d, s in zip(held, stack[1:], strict=True)), 0.0)) @ self.z[k]
+            self.x.append(after[: self.n])
+            self.y[k] = after[self.n :] + self.v[k] + self.remainder[0] * rng.choice([-1.0, 1.0], self.ny)
+        self.y[rng.random(self.y.shape) < 0.3] = np.nan
+
+    def short(self, *shape: int) -> Any:
+        return self.rng.integers(self.least, 5, shape) / 4.0 * (self.rng.random(shape) < 0.8)
+
+    def few(self, *shape: int) -> Any:
+        """Multipliers most of which are zero: a row that is wrong is not covered by the room of others."""
+        sign = self.rng.choice([-1.0, 1.0], shape)
+        return sign * self.short(*shape) * (self.rng.random(shape) < 0.4) * (self.rng.random() < 0.5)
+
+    def around(self, values: Any) -> tuple[Any, Any]:
+        """Bounds with the values at one end or the other, or inside."""
+        room = [abs(self.short(*np.shape(values))) * (self.rng.random(np.shape(values)) < 0.5) for _ in range(2)]
+        return values - room[0], values + room[1]
+
+    def sums(self) -> list[dict[str, Any]]:
+        """Bounds of sums that are as near as this run allows, on both sides."""
+        found = []
+        for column in range(self.ny + self.nw):
+            q = int(self.rng.integers(1, 4))
+            of = self.v[:, column] if column < self.ny else self.w[:, column - self.ny]
+            runs = [of[k : k + q].sum() for k in range(SAMPLES + 1 - q)]
+            found.append({"column": column, "samples": q, "ends": array([min(runs), max(runs)])})
+        return found
+
+    def record(self) -> dict[str, Any]:
+        low, high = self.around(self.w)
+        directions = self.short(1, self.n)
+        box, ends = self.around(self.x[0]), self.around(directions @ self.x[0])
+        w_ends = [(self.w @ self.rows.T).min(axis=0), (self.w @ self.rows.T).max(axis=0)]
+        return {
+            "n": self.n, "inputs": self.nu, "outputs": self.ny, "disturbances": self.nw,
+            "matrices": {"stacks": array(self.stacks)}, "delta": array(self.delta), "noise": array(self.noise),
+            "w_lower": array(low), "w_upper": array(high), "sums": self.sums(), "remainder": array(self.remainder),
+            "w_rows": {"rows": array(self.rows), "lower": array(w_ends[0]), "upper": array(w_ends[1])},
+            "first": {"box_lower": array(box[0]), "box_upper": array(box[1]),
+                      "rows": array(directions), "lower": array(ends[0]), "upper": array(ends[1])},
+            "physical": None, "largest": None,
+        }  # fmt: skip
+
+    def chain(self) -> Any:
+        """A chain with bounds of states, and of s, that hold on this run."""
+        log = SimpleNamespace(time=list(range(SAMPLES)), u=self.u.tolist(), y=self.y.tolist())
+        chain = CHECK.Chain(CHECK.Model(self.record()), log, SAMPLES - 1)
+        template = self.short(1, self.n)
+        chain.take({"step": "start", "sample": 0, "from": "first", "template": array(template)})
+        for k in range(SAMPLES):
+            for row, value in enumerate([*self.x[k], *(template @ self.x[k])]):
+                low, high = self.around(value)
+                chain.bounds |= {(k, row, -1): float(low), (k, row, 1): float(high)}
+            nq = int(self.rng.integers(0, 3)) if self.items else 0
+            gain, functional = self.short(nq, self.n + self.ny), self.short(nq, self.columns)
+            owner = [int(self.rng.integers(1, self.items + 1)) for _ in range(nq)]
+            step = {"step": "channels", "sample": k, "owner": owner, "gain": array(gain.reshape(nq, self.n + self.ny))}
+            chain.take(step | {"functional": array(functional.reshape(nq, self.columns))})
+            for q, s in enumerate(functional @ self.z[k]):
+                low, high = self.around(s)
+                chain.s |= {(k, q, -1): float(low), (k, q, 1): float(high)}
+        return chain
+
+    def step(self, chain: Any) -> dict[str, Any]:
+        """Any multipliers on any window."""
+        first, last = sorted(int(k) for k in self.rng.integers(0, SAMPLES, 2))
+        window = range(first, last + 1)
+        ends = [(i, k) for i, (_, q, *_) in enumerate(chain.model.sums) for k in window if k - q + 1 >= first]
+        lines, numbers = [], []
+        for k in window:
+            for q, owner in enumerate(chain.channels[k][0]):
+                side, slope = int(self.rng.integers(2)), float(self.short())
+                corners = [(d - slope) * chain.s[k, q, end] for d in chain.model.delta[owner - 1] for end in (-1, 1)]
+                lines.append([k - first, q, side])
+                numbers.append([abs(float(self.few())), slope, min(corners) if side else max(corners)])
+        return {
+            "first": first, "last": last, "on_start": array(self.few(1)),
+            "on_output": array(np.where(np.isnan(self.y[first : last + 1]), 0.0, self.few(len(window), self.ny))),
+            "on_w": array(self.few(len(window), self.nh)), "on_sum": [list(end) for end in ends],
+            "sum": array(self.few(len(ends), 1)), "on_line": lines, "line": array(np.reshape(numbers, (-1, 3))),
+        }  # fmt: skip
+
+
+def exact(number: Any) -> Fraction:
+    return number.m[0] * Fraction(2) ** number.e
+
+
+@pytest.mark.parametrize("seeds", [range(300), pytest.param(range(300, 3000), marks=pytest.mark.slow)])
+def test_any_multipliers_prove_only_what_holds_on_a_run(seeds: range) -> None:
+    tight = 0
+    for seed in seeds:
+        run = Trajectory(seed)
+        chain = run.chain()
+        for _ in range(3):
+            step = run.step(chain)
+            at = int(run.rng.integers(step["first"], step["last"] + 1))
+            d = run.few(run.columns).tolist()
+            total = exact(chain._total(step, at, CHECK.Vec.of(d)))
+            value = sum((Fraction(a) * Fraction(b) for a, b in zip(d, run.z[at].tolist(), strict=True)), Fraction(0))
+            assert total <= -value, seed
+            assert exact(chain._total(step)) <= 0, seed
+            tight += math.isclose(total, -value)
+    assert tight > len(seeds) // 100  # some bounds are reached: none has room to spare
