@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from polytopes.answers import Answer
 from polytopes.checks import Floats
 from polytopes.inclusion import half_spaces
+from polytopes.lengths import evened, lengths
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty, support_points
 
@@ -35,10 +36,10 @@ class Containment(Answer):
 
 def contains_points(P: Rows, points: Floats, tol: float) -> NDArray[np.bool_]:
     """For each point (k, n): is it within `tol` of every half-space and hyperplane of P (Euclidean distance)?"""
-    lengths, fixed = np.linalg.norm(P.A, axis=1), np.linalg.norm(P.C, axis=1)
-    inside = (points @ P.A.T - P.b <= tol * lengths).all(axis=1)
-    on: NDArray[np.bool_] = (np.abs(points @ P.C.T - P.d) <= tol * fixed).all(axis=1)
-    return inside & on
+    (A, b, lengths), (C, d, fixed) = P.even_inequalities, P.even_equalities
+    inside = (points @ A.T - b <= tol * lengths).all(axis=1)
+    on = (np.abs(points @ C.T - d) <= tol * fixed).all(axis=1)
+    return np.asarray(inside & on, dtype=bool)
 
 
 def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
@@ -48,14 +49,14 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
     """
     if not known_nonempty(Q):
         return Containment(True)
-    normals, sides = half_spaces(P)
-    lengths = np.linalg.norm(normals, axis=1)
+    normals, sides = evened(*half_spaces(P))
+    sizes = lengths(normals)
     beyond = Q.program.estimate(normals) - sides
-    broken = ~(beyond <= tol * lengths)
+    broken = ~(beyond <= tol * sizes)
     if not broken.any():
         return Containment(True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        excess = np.where(broken, np.where(np.isnan(beyond), np.inf, beyond) / lengths, -np.inf)
+        excess = np.where(broken, np.where(np.isnan(beyond), np.inf, beyond) / sizes, -np.inf)
     i = int(np.argmax(excess))
     row = i if i < P.b.size + P.d.size else i - P.d.size
     return Containment(False, _beyond(Q, normals[i], float(sides[i]), tol), row, float(excess[i]))

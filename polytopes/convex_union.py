@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from polytopes.inclusion import broken_row, half_spaces
+from polytopes.inclusion import broken_row, half_spaces, strictest
 from polytopes.rows import Rows
 from polytopes.set_difference import remainder
 
@@ -21,7 +21,7 @@ def envelope(sets: Sequence[Piece]) -> Piece:
     """The set of the rows of each of some nonempty sets that hold all over the others, an equality as two rows."""
     rows, sides = [np.empty((0, sets[0].dim))], [np.empty(0)]
     for i, P in enumerate(sets):
-        normals, bounds = half_spaces(P)
+        normals, bounds = strictest(*half_spaces(P))
         others = [Q for k, Q in enumerate(sets) if k != i]
         holds = [_holds(normal, bound, others) for normal, bound in zip(normals, bounds.tolist(), strict=True)]
         rows.append(normals[holds])

@@ -15,6 +15,7 @@ from polytopes.affine_hull import explicit
 from polytopes.checks import Floats
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.frame import unit_body
+from polytopes.lengths import evened, lengths
 from polytopes.moments import Triangulated
 from polytopes.rows import Rows
 from polytopes.shown import Shown
@@ -76,8 +77,8 @@ def inscribed_ellipsoid(P: Rows) -> Ellipsoid:
     centre, axes = _largest(body.rows, body.rhs)
     middle = program.lift(body.lift(centre))
     spread = np.array([program.lift(body.lift(centre + axis)) - middle for axis in axes.T]).T
-    reach = np.linalg.norm(P.A @ spread, axis=1)
-    room = P.b - P.A @ middle
+    A, b = evened(P.A, P.b)
+    reach, room = lengths(A @ spread), b - A @ middle
     crossed = reach > np.maximum(room, 0.0)
     factor = float((room[crossed] / reach[crossed]).min(initial=1.0))
     return Ellipsoid(middle, spread * max(factor, 0.0) * (1.0 - 8.0 * _EPS))

@@ -9,6 +9,8 @@ import numpy as np
 from flint import arb, arb_mat, fmpq, fmpq_mat, fmpz
 from numpy.typing import NDArray
 
+from polytopes.errors import UndecidedError
+
 Multipliers = dict[int, fmpq]  # row index -> multiplier; rows that are absent have multiplier zero
 
 ZERO = fmpq(0)
@@ -56,9 +58,23 @@ def rational_matrix(matrix: NDArray[np.float64]) -> fmpq_mat:
     return fmpq_mat(rows, columns, rational_vector(matrix.ravel()))
 
 
+def quotient(numerator: int, denominator: int) -> float:
+    """The nearest float.
+
+    Raises
+    ------
+    UndecidedError
+        If it is beyond all floats.
+    """
+    try:
+        return numerator / denominator
+    except OverflowError:
+        raise UndecidedError("a number of the answer is beyond all floats; use other units.") from None
+
+
 def to_floats(values: Iterable[fmpq]) -> NDArray[np.float64]:
     """Rationals rounded to the nearest floats."""
-    return np.array([int(v.p) / int(v.q) for v in values], dtype=np.float64)
+    return np.array([quotient(int(v.p), int(v.q)) for v in values], dtype=np.float64)
 
 
 def row_to_floats(coefficients: Sequence[fmpq], constant: fmpq) -> NDArray[np.float64]:

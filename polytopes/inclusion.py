@@ -36,6 +36,17 @@ def half_spaces(P: Rows) -> tuple[Floats, Floats]:
     return np.vstack([P.A, P.C, -P.C]), np.concatenate([P.b, P.d, -P.d])
 
 
+def strictest(normals: Floats, sides: Floats) -> tuple[Floats, Floats]:
+    """Of rows with one normal, to the bit, the one with the least side; in their order."""
+    kept: dict[bytes, int] = {}
+    for i, normal in enumerate(normals):
+        k = kept.setdefault(normal.tobytes(), i)
+        if sides[i] < sides[k]:
+            kept[normal.tobytes()] = i
+    chosen = sorted(kept.values())
+    return normals[chosen], sides[chosen]
+
+
 def broken_row(P: Rows, Q: Rows) -> int | None:
     """Number of a row of P (see `half_spaces`) that some point of Q breaks; None if Q lies in P.  Exact.
 

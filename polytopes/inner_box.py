@@ -6,6 +6,7 @@ from polytopes.affine_hull import explicit
 from polytopes.checks import Floats
 from polytopes.errors import UnboundedError, UndecidedError
 from polytopes.exact_sides import exact_form
+from polytopes.lengths import evened
 from polytopes.rows import Rows
 from polytopes.support import bounding_box, maxima
 
@@ -59,10 +60,9 @@ def _widths_of_largest_volume(P: Rows, lower: Floats, upper: Floats) -> Floats:
     if not free.any():
         return (upper - lower) / 2.0
     size = np.ldexp(1.0, np.frexp(np.where(upper > lower, upper - lower, 1.0))[1])
-    A, sides = flat.A * size, flat.b - flat.A @ lower
-    lengths = np.where(A.any(axis=1), np.linalg.norm(A, axis=1), 1.0)
+    A, sides = evened(flat.A * size, flat.b - flat.A @ lower)
     start, widths = cp.Variable(P.dim), cp.Variable(P.dim, nonneg=True)
-    held = [A / lengths[:, None] @ start + np.maximum(A, 0.0) / lengths[:, None] @ widths <= sides / lengths]
+    held = [A @ start + np.maximum(A, 0.0) @ widths <= sides]
     fixed = [widths[~free] == 0.0, (flat.C * size) @ start == flat.d - flat.C @ lower]
     problem = cp.Problem(cp.Maximize(cp.sum(cp.log(widths[free]))), held + (fixed if flat.d.size else []))
     problem.solve(solver=cp.CLARABEL)

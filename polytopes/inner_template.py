@@ -11,6 +11,7 @@ from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.inclusion import broken_row
 from polytopes.largest_copy import largest_copy
+from polytopes.lengths import lengths
 from polytopes.rows import Rows, Table
 from polytopes.support import is_bounded, maxima, support
 
@@ -32,9 +33,9 @@ def inner_template(P: Rows, T: Floats) -> Table:
         If inclusion could not be proved.
     """
     body = explicit(P)
-    lengths, most = np.linalg.norm(_along(body, T), axis=1), np.atleast_1d(support(body, T))
-    across = lengths <= _ACROSS * np.linalg.norm(T, axis=1)
-    shape = Rows(T, np.where(across, 0.0, lengths), body.C, 0.0 * body.d)
+    sizes, most = lengths(_along(body, T)), np.atleast_1d(support(body, T))
+    across = sizes <= _ACROSS * lengths(T)
+    shape = Rows(T, np.where(across, 0.0, sizes), body.C, 0.0 * body.d)
     if not is_bounded(shape):
         raise ValueError("directions leave sets unbounded; expected rows that hold one: box_directions(n) and others.")
     centre, scale = largest_copy(body, shape)

@@ -1,5 +1,6 @@
 """Floats as integers and back: every float is an integer times a power of two."""
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from math import gcd
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from polytopes.checks import Floats
 from polytopes.double_description import Integers, primitive
+from polytopes.errors import UndecidedError
 
 SHORT = 2**32
 """Rows whose primitive integers stay below are short: sets of short rows are computed with exactly."""
@@ -103,7 +105,10 @@ def whole_numbers(vector: Floats) -> tuple[NDArray[np.object_], int]:
 
 def up(value: Fraction | float) -> float:
     """The least float not below a number."""
-    nearest = float(value)
+    try:
+        nearest = float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -float(np.finfo(np.float64).max)
     return nearest if nearest >= value else float(np.nextafter(nearest, np.inf))
 
 
@@ -116,7 +121,10 @@ def as_floats(row: list[int], normal: list[int]) -> Floats:
 
 def floats_of_points(points: Integers) -> Floats:
     """Points ``[x, t]`` (k, n + 1) to the nearest floats x / t (k, n)."""
-    values = [[v / row[-1] for v in row[:-1]] for row in points.tolist()]
+    try:
+        values = [[v / row[-1] for v in row[:-1]] for row in points.tolist()]
+    except OverflowError:
+        raise UndecidedError("a point of the answer is beyond all floats; use other units.") from None
     return np.array(values, dtype=np.float64).reshape(len(points), points.shape[1] - 1)
 
 

@@ -15,6 +15,7 @@ from flint import fmpq, fmpq_mat
 
 from polytopes.checks import Floats
 from polytopes.exact import ZERO, rational, rational_matrix, rational_vector
+from polytopes.lengths import evened, lengths
 from polytopes.rows import Rows
 
 _STILL = 1e-12  # of the size of a point: a step that is none, or a multiplier that is not negative
@@ -41,9 +42,9 @@ def nearest(P: Rows, F: Floats, g: Floats, exactly: bool = True) -> Nearest:
 
 
 def _by_active_set(P: Rows, F: Floats, g: Floats, y: Floats) -> tuple[Floats, list[int]]:
-    lengths = np.linalg.norm(P.A, axis=1)
-    rows = np.flatnonzero(lengths)
-    A, b = P.A[rows] / lengths[rows, None], P.b[rows] / lengths[rows]
+    rows = np.flatnonzero(P.A.any(axis=1))
+    A, b = evened(P.A[rows], P.b[rows])
+    A, b = A / lengths(A)[:, None], b / lengths(A)
     held: list[int] = []
     last = np.inf
     for _ in range(_STEPS * (len(A) + P.dim)):

@@ -264,7 +264,9 @@ class Program:
         values = np.maximum(values, -np.finfo(np.float64).max)
         values = program._with_constants(directions, values, constants)
         lifted, multipliers = program.lift(found.points), np.zeros((k, self.b.size))
-        multipliers[:, self.kept] = np.ldexp(found.weights, program.row_powers + tops[:, None])
+        with np.errstate(over="ignore"):  # rows far below one: those used are right, whatever their multipliers
+            weights = np.ldexp(found.weights, program.row_powers + tops[:, None])
+        multipliers[:, self.kept] = np.minimum(weights, np.finfo(np.float64).max)
         for q, name in enumerate(found.status):
             if name == UNBOUNDED and not self.thin:  # of a thin set, floats take an edge for a ray
                 values[q] = np.inf

@@ -16,7 +16,7 @@ from flint import fmpq, fmpq_mat
 from polytopes.affine_hull import affine_dim
 from polytopes.checks import Floats
 from polytopes.derived import derived
-from polytopes.exact import ZERO, to_floats
+from polytopes.exact import ZERO, quotient, to_floats
 from polytopes.incidence import incidence, sorted_vertices
 from polytopes.rows import Rows
 from polytopes.support import is_bounded, known_nonempty
@@ -107,7 +107,15 @@ def relative_volume(P: Rows) -> float:
         return inf
     body = Triangulated.of(P)
     d = body.simplices.shape[1] - 1
-    return float(body.shares.sum()) / factorial(d) * float(to_floats([body.squared_scale])[0]) ** 0.5
+    return float(body.shares.sum()) / factorial(d) * _root(body.squared_scale)
+
+
+def _root(squared: fmpq) -> float:
+    """The root of a rational, nearly to the nearest float."""
+    p, q = int(squared.p), int(squared.q)
+    shift = max(0, 128 - p.bit_length() + q.bit_length())
+    shift += shift % 2
+    return quotient(isqrt((p << shift) // q), 1 << (shift // 2))
 
 
 def exact_volume(P: Rows) -> Fraction | float:

@@ -80,4 +80,11 @@ def _gauge(places: list[Fraction], sides: Floats) -> float:
             most, limited = (min(most, place / side) if limited else place / side), True
         elif place > 0:
             return inf
-    return float(least) if not limited or (least <= most and most > 0) else inf
+    return _nearest(least) if not limited or (least <= most and most > 0) else inf
+
+
+def _nearest(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return inf

@@ -5,6 +5,7 @@ import heapq
 import numpy as np
 
 from polytopes.checks import Floats
+from polytopes.lengths import lengths
 from polytopes.linear_program import OPTIMAL
 from polytopes.preparation import prepare
 from polytopes.rows import Rows
@@ -41,4 +42,4 @@ def _growth(P: Rows, kept: list[int], i: int) -> float:
     best = prepare(P.A[others], P.b[others], P.C, P.d).maximise(P.A[[i]])
     if best.status[0] != OPTIMAL:
         return np.inf
-    return float(best.values[0] - P.b[i]) / float(np.linalg.norm(P.A[i]))
+    return float(best.values[0] - P.b[i]) / float(lengths(P.A[[i]])[0])

@@ -13,6 +13,7 @@ from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
 from polytopes.general_position import simple_vertices
 from polytopes.integers import maybe_short
+from polytopes.lengths import evened, lengths
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.preparation import prepare
@@ -91,6 +92,18 @@ class Rows(Value):
         if self.as_box is not None:
             return Emptiness("nonempty", self.as_box.point, None, "a point between the bounds of a box")
         return decide_emptiness(self, self.program)
+
+    @derived
+    def even_inequalities(self) -> tuple[Floats, Floats, Floats]:
+        """Rows A and b, each times a power of two that brings it near 1, and their lengths."""
+        A, b = evened(self.A, self.b)
+        return A, b, lengths(A)
+
+    @derived
+    def even_equalities(self) -> tuple[Floats, Floats, Floats]:
+        """The same of C and d."""
+        C, d = evened(self.C, self.d)
+        return C, d, lengths(C)
 
     @derived
     def wide(self) -> bool:

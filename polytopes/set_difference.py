@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from polytopes.inclusion import broken_row, half_spaces
+from polytopes.inclusion import broken_row, half_spaces, strictest
 from polytopes.rows import Rows
 from polytopes.separation import intersects
 from polytopes.support import known_nonempty
@@ -29,7 +29,7 @@ def difference(P: Piece, Q: Rows) -> list[Piece]:
     if not intersects(P, Q):
         return [P] if known_nonempty(P) else []
     pieces, rest = [], P
-    for normal, side in zip(*half_spaces(Q), strict=True):
+    for normal, side in zip(*strictest(*half_spaces(Q)), strict=True):
         if broken_row(Rows(normal[None], [side]), rest) is not None:
             pieces.append(_with_row(rest, -normal, -side))
             rest = _with_row(rest, normal, side)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from polytopes.checks import Floats, real_array
 from polytopes.duality import equality_multipliers
 from polytopes.errors import EmptySetError, UndecidedError
+from polytopes.lengths import evened, lengths
 from polytopes.linear_program import UNDECIDED, Maxima
 from polytopes.rows import Rows
 from polytopes.shown import Shown
@@ -156,11 +157,12 @@ def chebyshev(P: Rows) -> Ball:
     if not flat.free:
         return Ball(flat.point.copy(), 0.0)
     along = np.linalg.qr(flat.basis / np.linalg.norm(flat.basis, axis=0))[0] if flat.pivots else np.eye(P.dim)
-    norms = np.linalg.norm(P.A @ along, axis=1) * flat.restrict(P.A, P.b)[0].any(axis=1)
+    A, b = evened(P.A, P.b)
+    norms = lengths(A @ along) * flat.restrict(P.A, P.b)[0].any(axis=1)
     radius = np.append(np.zeros(P.dim), 1.0)
     lifted = Rows(
-        np.vstack([np.hstack([P.A, norms[:, None]]), -radius]),
-        np.append(P.b, 0.0),
+        np.vstack([np.hstack([A, norms[:, None]]), -radius]),
+        np.append(b, 0.0),
         np.hstack([P.C, np.zeros((P.d.size, 1))]),
         P.d,
     )
