@@ -109,12 +109,12 @@ def different_coordinates(name: str, value: Any, dim: int) -> list[int]:
     return found
 
 
-def listed(name: str, value: Any, kind: type[Item], *others: type[Item]) -> list[Item]:
+def listed(name: str, value: Any, kind: type[Item], *others: type[Item], called: str = "") -> list[Item]:
     """What a sequence holds, each item of one of some kinds; TypeError otherwise.
 
-    A mapping is none: its keys are not meant.
+    A mapping is none: its keys are not meant.  `called` is what users call the kinds.
     """
-    expected = f"expected a sequence of {' or '.join(k.__name__ for k in (kind, *others))}"
+    expected = f"expected a sequence of {called or ' or '.join(k.__name__ for k in (kind, *others))}"
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         raise TypeError(f"{name} is {_kind_of(value)}; {expected}.")
     items = list(value)

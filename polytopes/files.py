@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from math import gcd, lcm
 from pathlib import Path
 
 import numpy as np
 
-from polytopes.checks import Floats
-from polytopes.double_description import Integers
 from polytopes.exact_generators import integer_form
+from polytopes.fractions_given import integers_of, primitive_row, row_of_floats
 from polytopes.generators import in_integers
 from polytopes.hpolytope import HPolytope
-from polytopes.integers import are_floats, as_floats
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.outward import float_rows
 from polytopes.support import known_nonempty
@@ -48,7 +45,9 @@ def read_ine(path: str | Path) -> HPolytope:
         If the file at `path` is no H-representation, or a row of it is no multiple of floats.
     """
     table, linear, n = _read(path, "H-representation")
-    rows = np.array([_row_of_floats(path, i, row) for i, row in enumerate(table)]).reshape(len(table), n + 1)
+    rows = np.array([row_of_floats(f"{path}: row {i + 1}", row) for i, row in enumerate(table)]).reshape(
+        len(table), n + 1
+    )
     fixed = np.array([i in linear for i in range(len(table))], dtype=bool)
     return HPolytope(-rows[~fixed, 1:], rows[~fixed, 0], -rows[fixed, 1:], rows[fixed, 0])
 
@@ -95,33 +94,14 @@ def read_ext(path: str | Path) -> HPolytope:
         if row[0] not in (0, 1) or (row[0] == 1 and i in linear):
             raise ValueError(f"{path}: row {i + 1} begins with {row[0]}; expected 1 (a point) or 0 (a ray, a line).")
         if row[0] == 1:
-            parts["vertices"].append(_primitive([*row[1:], Fraction(1)]))
+            parts["vertices"].append(primitive_row([*row[1:], Fraction(1)]))
         elif any(row[1:]):
-            parts["lines" if i in linear else "rays"].append(_primitive(row[1:]))
+            parts["lines" if i in linear else "rays"].append(primitive_row(row[1:]))
     if not table:
         return HPolytope.empty(n)
     vertices = parts["vertices"] or [[0] * n + [1]]
     tables = ((vertices, n + 1), (parts["rays"], n), (parts["lines"], n))
-    return HPolytope(*float_rows(ExactGenerators(*(_integers(rows, width) for rows, width in tables))))
-
-
-def _integers(rows: list[list[int]], width: int) -> Integers:
-    return np.array(rows, dtype=object).reshape(len(rows), width)
-
-
-def _primitive(row: list[Fraction]) -> list[int]:
-    """The row times a positive number, as integers without a common divisor."""
-    common = lcm(*(v.denominator for v in row))
-    whole = [int(v * common) for v in row]
-    divisor = gcd(*whole) or 1
-    return [v // divisor for v in whole]
-
-
-def _row_of_floats(path: str | Path, i: int, row: list[Fraction]) -> Floats:
-    whole = _primitive(row)
-    if not are_floats(whole):
-        raise ValueError(f"{path}: row {i + 1} is no multiple of floats; round it first.")
-    return as_floats(whole, whole)
+    return HPolytope(*float_rows(ExactGenerators(*(integers_of(rows, width) for rows, width in tables))))
 
 
 def _write(path: str | Path, kind: str, table: Sequence[Sequence[int | Fraction]], linear: int, n: int) -> None:

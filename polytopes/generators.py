@@ -2,14 +2,16 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from polytopes.checks import Floats
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.exact_generators import integer_form
+from polytopes.fractions_given import exact_table, integers_of, primitive_row
 from polytopes.hull import Spread, outer_rows, point_offsets
-from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, short
+from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, lowest_bit, short
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
 from polytopes.outward import float_rows
 from polytopes.rows import Rows, Table
@@ -17,6 +19,7 @@ from polytopes.shown import Shown
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
 
+_SHORT_BITS = 32
 _FEW = 200  # long points up to which a flat hull is found in integers
 
 
@@ -82,12 +85,36 @@ def exact_vertices(P: Rows) -> list[tuple[Fraction, ...]]:
     return sorted(tuple(Fraction(int(v), int(row[-1])) for v in row[:-1]) for row in found.vertices.tolist())
 
 
+def rows_of_fractions(V: Any, rays: Any) -> Table:
+    """The same of points and rays with fractions among their numbers, taken exactly; rows outward if not floats.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an entry is no number, or a shape does not fit.
+    UndecidedError
+        If the double description passes 10 000 rows.
+    """
+    points = exact_table("V", V)
+    directions = [] if rays is None else [row for row in exact_table("rays", rays) if any(row)]
+    n = len(points[0]) if points else 0
+    if not n or any(len(row) != n for row in directions):
+        raise ValueError(f"V has shape ({len(points)}, {n}); expected (k, n), one or more points, and rays as long.")
+    parts = [primitive_row([*row, Fraction(1)]) for row in points], [primitive_row(row) for row in directions]
+    vertices, cone = integers_of(parts[0], n + 1), integers_of(parts[1], n)
+    return float_rows(ExactGenerators(distinct(vertices), distinct(cone), cone[:0]))
+
+
 def rows_of_generators(V: Floats, rays: Floats) -> Table:
     """Rows A, b, C, d of ``conv(V) + cone(rays)``, k >= 1 points.
 
     In integers where the numbers are short, where there are rays, and where the points are flat; the rows are exact if
     they are floats, and outward else.
     """
+    unit = _unit(V)
+    if unit:
+        A, b, C, d = rows_of_generators(np.ldexp(V, -unit), rays)
+        return A, np.ldexp(b, unit), C, np.ldexp(d, unit)
     points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
     directions = integer_rows(rays[rays.any(axis=1)])
     exact = short(points) or len(directions) > 0
@@ -101,3 +128,13 @@ def rows_of_generators(V: Floats, rays: Floats) -> Table:
                 raise
     A, b = outer_rows(spread or Spread.of(V), point_offsets(V))
     return A, b, np.empty((0, V.shape[1])), np.empty(0)
+
+
+def _unit(V: Floats) -> int:
+    """The exponent of a power of two of which points V are short multiples; 0 where they are short as they are."""
+    some = V[V != 0.0]
+    if not some.size:
+        return 0
+    lowest, highest = int(lowest_bit(some).min()), int(np.frexp(some)[1].max())
+    near = lowest >= -_SHORT_BITS and highest <= _SHORT_BITS
+    return 0 if near or highest - lowest > _SHORT_BITS else lowest

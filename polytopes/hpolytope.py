@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from polytopes import exchange, plotting
 from polytopes.checks import different_coordinates, real_array, whole_number
 from polytopes.constructions import Constructions
-from polytopes.generators import rows_of_generators
+from polytopes.fractions_given import hold_fractions
+from polytopes.generators import rows_of_fractions, rows_of_generators
 from polytopes.operators import Operators
 from polytopes.piecewise import Union
 from polytopes.shown import Picture, Shown
@@ -31,6 +32,7 @@ class HPolytope(Shown, Operators):
     ----------
     A, b : array_like (m, n) and (m,)
         Inequalities; m may be 0.  A and C may be sparse (SciPy).  A row whose b is +inf bounds nothing and is left out.
+        Rows with a `fractions.Fraction` are multiplied by what makes integers of them, and so taken exactly.
     C, d : array_like (q, n) and (q,), optional
         Equalities.
 
@@ -78,13 +80,15 @@ class HPolytope(Shown, Operators):
         In integers where the numbers are short (multiples of one power of two, up to 2^32 times), where there are rays
         and where the points are flat: the rows are exact where they are floats.  Else by Qhull, in scaled coordinates.
         Rows that had to be rounded are rounded outward, so that every point satisfies them; points that are flat only
-        to rounding are held in a slab.
+        to rounding are held in a slab.  Points with a `fractions.Fraction` are taken exactly, in integers.
 
         Raises
         ------
         UndecidedError
             If there are rays, and the double description passes 10 000 rows.
         """
+        if hold_fractions(V, rays):
+            return cls(*rows_of_fractions(V, rays))
         points = real_array("V", V, ("k", "n"))
         if 0 in points.shape:
             raise ValueError(f"V has shape {points.shape}; expected one or more points (none: HPolytope.empty).")
@@ -117,8 +121,10 @@ class HPolytope(Shown, Operators):
 
     @classmethod
     def cross_polytope(cls, n: int) -> Self:
-        """``{|x_1| + ... + |x_n| <= 1}``, 2^n rows."""
-        signs = np.array(list(itertools.product([1.0, -1.0], repeat=whole_number("n", n, least=1))))
+        """``{|x_1| + ... + |x_n| <= 1}``, 2^n rows; n at most 20."""
+        if whole_number("n", n, least=1) > 20:
+            raise ValueError(f"n is {n}; expected at most 20: a cross-polytope has 2^n rows.")
+        signs = np.array(list(itertools.product([1.0, -1.0], repeat=n)))
         return cls(signs, np.ones(len(signs)))
 
     def __repr__(self) -> str:

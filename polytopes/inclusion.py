@@ -5,6 +5,9 @@ above b proves it, a lower bound above b refutes it.  What is between them is de
 of the rows at hand, by the rational simplex, or by the generators in integers.
 """
 
+from collections.abc import Sequence
+from fractions import Fraction
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +32,13 @@ def has_point(P: Rows, x: Floats) -> bool:
     if (excess > room).any():
         return False
     return all(exact_form(normals[i], x) <= sides[i] for i in np.flatnonzero(~(excess < -room)))
+
+
+def has_exact_point(P: Rows, x: Sequence[Fraction]) -> bool:
+    """The same of a point of rationals."""
+    normals, sides = half_spaces(P)
+    values = [sum((Fraction(u) * v for u, v in zip(row, x, strict=True)), Fraction(0)) for row in normals.tolist()]
+    return all(value <= side for value, side in zip(values, sides.tolist(), strict=True))
 
 
 def half_spaces(P: Rows) -> tuple[Floats, Floats]:

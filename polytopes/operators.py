@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from polytopes.checks import real_array, whole_number
 from polytopes.constructions import Constructions
-from polytopes.inclusion import broken_row, has_point
+from polytopes.fractions_given import exact_numbers, hold_fractions
+from polytopes.inclusion import broken_row, has_exact_point, has_point
 from polytopes.rows import Rows, same_space
 
 
@@ -17,6 +18,7 @@ class Operators(Constructions):
     """Sets with operators.  Arrays, dense and sparse, leave them to the set."""
 
     __array_ufunc__ = None  # numpy asks the set, instead of going over it as an array of objects
+    __pandas_priority__ = 5000  # and so does pandas
     __hash__ = None  # type: ignore[assignment]  # one set has many rows, so no hash of them agrees with ==
 
     def __and__(self, Q: Rows) -> Self:
@@ -36,6 +38,11 @@ class Operators(Constructions):
     def __rmatmul__(self, M: ArrayLike) -> Self:
         return self.affine_map(M)
 
+    def __matmul__(self, M: ArrayLike) -> Self:
+        raise TypeError(
+            "P @ M is not defined: M @ P is an image, P.preimage(M) what M takes into the set."
+        )
+
     def __neg__(self) -> Self:
         return type(self)(-self.A, self.b, -self.C, self.d)
 
@@ -51,7 +58,12 @@ class Operators(Constructions):
     def __contains__(self, x: Any) -> bool:
         if isinstance(x, Rows):
             raise TypeError("x is a set; expected a point (n,). Q <= P says whether a set lies in P.")
-        return has_point(self, real_array("x", x, (self.dim,)))
+        if not hold_fractions(x):
+            return has_point(self, real_array("x", x, (self.dim,)))
+        point = exact_numbers("x", x)
+        if len(point) != self.dim:
+            raise ValueError(f"x has shape ({len(point)},); expected ({self.dim},).")
+        return has_exact_point(self, point)
 
     def __le__(self, Q: Rows) -> bool:
         return broken_row(same_space(self, Q), self) is None if isinstance(Q, Rows) else NotImplemented

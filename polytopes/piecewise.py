@@ -41,9 +41,11 @@ class Union(Shown):
     """
 
     __hash__ = None  # type: ignore[assignment]  # as of sets
+    __array_ufunc__ = None  # numpy and pandas leave operators to it
+    __pandas_priority__ = 5000
 
     def __init__(self, pieces: Sequence[Constructions]) -> None:
-        given = listed("pieces", pieces, Constructions)
+        given = listed("pieces", pieces, Constructions, called="HPolytope")
         if not given:
             raise ValueError("pieces is empty; expected at least one HPolytope, HPolytope.empty(n) for the empty set.")
         for P in given:

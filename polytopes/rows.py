@@ -11,6 +11,7 @@ from polytopes.checks import Floats, real_array
 from polytopes.derived import derived
 from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
+from polytopes.fractions_given import hold_fractions, rows_of_floats
 from polytopes.general_position import simple_vertices
 from polytopes.integers import maybe_short
 from polytopes.lengths import evened, lengths
@@ -30,7 +31,7 @@ class Rows(Value):
     Parameters
     ----------
     A, b : array_like (m, n) and (m,)
-        A and C may be sparse; a row whose b is +inf bounds nothing and is left out.
+        A and C may be sparse; a row whose b is +inf bounds nothing and is left out.  Fractions are taken exactly.
     C, d : array_like (q, n) and (q,), optional
         Explicit equalities.
 
@@ -46,6 +47,10 @@ class Rows(Value):
     d: Floats
 
     def __init__(self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None) -> None:
+        if hold_fractions(A, b):
+            A, b = rows_of_floats("Ab", dense(A), b)
+        if hold_fractions(C, d):
+            C, d = rows_of_floats("Cd", dense(C), d)
         rows = real_array("A", dense(A), ("m", "n"))
         m, n = rows.shape
         if n == 0:

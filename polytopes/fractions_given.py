@@ -1,0 +1,96 @@
+"""Rational numbers that a user gives as `fractions.Fraction`: rows and points are taken exactly, in integers.
+
+A row may be multiplied by a positive number, so that ``[1/3, 1] x <= 1/7`` is a row of floats, ``[7, 21] x <= 3``.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import gcd, lcm
+from typing import Any
+
+import numpy as np
+
+from polytopes.checks import Floats
+from polytopes.double_description import Integers
+from polytopes.integers import are_floats, as_floats
+
+
+def hold_fractions(*parts: Any) -> bool:
+    """Whether lists, tuples or arrays of objects hold a Fraction."""
+    return any(_holds(part) for part in parts)
+
+
+def _holds(part: Any) -> bool:
+    if isinstance(part, np.ndarray):
+        return part.dtype == object and any(isinstance(v, Fraction) for v in part.flat)
+    return isinstance(part, Fraction) or (isinstance(part, list | tuple) and any(_holds(v) for v in part))
+
+
+def exact_table(name: str, value: Any) -> list[list[Fraction]]:
+    """Rows of numbers as fractions, each exactly; all of one length.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an entry is no number, or rows differ in length.
+    """
+    rows = [exact_numbers(f"{name}[{i}]", row) for i, row in enumerate(value)]
+    if len({len(row) for row in rows}) > 1:
+        raise ValueError(f"{name} is no array: rows differ in length. Expected numbers in rows of one length.")
+    return rows
+
+
+def exact_numbers(name: str, value: Any) -> list[Fraction]:
+    """Numbers as fractions."""
+    if not isinstance(value, list | tuple | np.ndarray):
+        raise TypeError(f"{name} is a {type(value).__name__}; expected a sequence of numbers.")
+    found = []
+    for v in value:
+        if not isinstance(v, int | float | Fraction | np.integer | np.floating):
+            raise TypeError(f"{name} holds a {type(v).__name__}; expected real numbers.")
+        if isinstance(v, float | np.floating) and not np.isfinite(v):
+            raise ValueError(f"{name} holds {v}; expected finite numbers beside fractions.")
+        found.append(v if isinstance(v, Fraction) else Fraction(v.item() if isinstance(v, np.generic) else v))
+    return found
+
+
+def rows_of_floats(names: str, A: Any, b: Any) -> tuple[Floats, Floats]:
+    """Rows ``A x <= b`` (or with =) of fractions as floats, each multiplied by a positive number.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit, or a row is no multiple of floats.
+    """
+    table, sides = exact_table(names[0], A), exact_numbers(names[1], b)
+    if len(table) != len(sides):
+        raise ValueError(
+            f"{names[1]} has shape ({len(sides)},); expected ({len(table)},), one entry per row of {names[0]}."
+        )
+    rows = [
+        row_of_floats(f"row {i} of {names[0]}", [*row, side])
+        for i, (row, side) in enumerate(zip(table, sides, strict=True))
+    ]
+    found = np.array(rows).reshape(len(rows), -1)
+    return found[:, :-1], found[:, -1]
+
+
+def row_of_floats(what: str, row: Sequence[Fraction]) -> Floats:
+    """A row times a positive number that makes floats of it; ValueError if there is none."""
+    whole = primitive_row(row)
+    if not are_floats(whole):
+        raise ValueError(f"{what} is no multiple of floats; round it first.")
+    return as_floats(whole, whole)
+
+
+def primitive_row(row: Sequence[Fraction]) -> list[int]:
+    """The row times a positive number, as integers without a common divisor."""
+    common = lcm(*(v.denominator for v in row))
+    whole = [int(v * common) for v in row]
+    divisor = gcd(*whole) or 1
+    return [v // divisor for v in whole]
+
+
+def integers_of(rows: Sequence[Sequence[int]], width: int) -> Integers:
+    """Rows of integers (m, width) as an array of objects."""
+    return np.array(rows, dtype=object).reshape(len(rows), width)
