@@ -33,7 +33,7 @@ from svo.observers import window_kernel as kernel
 from svo.observers.window.observer import WindowObserver
 
 HORIZONS = (5, 10, 20, 50)
-FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fPIC", "-shared")  # as the core, see core/CMakeLists.txt
+FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-trapping-math", "-fPIC", "-shared")  # as core/CMakeLists.txt
 CORE = Path(__file__).parents[1] / "core"
 
 

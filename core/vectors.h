@@ -58,6 +58,17 @@ static inline double largest_above(const double *restrict a, integer m)
     return larger(larger(part[0], part[1]), larger(part[2], part[3]));
 }
 
+/* The least entry that is a number; infinity if there is none. */
+static inline double least_of(const double *restrict a, integer m)
+{
+    double part[4] = {INFINITY, INFINITY, INFINITY, INFINITY};
+    integer j = 0;
+    for (; j + 4 <= m; j += 4)
+        for (int lane = 0; lane < 4; lane++) part[lane] = smaller(a[j + lane], part[lane]);
+    for (; j < m; j++) part[0] = smaller(a[j], part[0]);
+    return smaller(smaller(part[0], part[1]), smaller(part[2], part[3]));
+}
+
 /* The smallest entry, or zero. */
 static inline double smallest_below(const double *restrict a, integer m)
 {

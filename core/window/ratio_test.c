@@ -7,18 +7,37 @@
 #define NO_PIVOT 1e-9 /* entries of the tableau that count as zero */
 #define SAME 1e-9     /* ratios that far apart count as equal where a pivot is small */
 
-/* The places of nonbasic variables that the step makes dual infeasible, in w->candidate; their number.
+/* The ratio of each variable whose reduced cost changes its sign on the way, in w->move, NaN for the others; returns the
+ * least one of those whose flip takes all of the violation.
  *
- * Such a variable is at 1 with a falling reduced cost, at -1 with a rising one, or at its centre. */
-static integer blocking_variables(const window *w, double side)
+ * Such a variable is nonbasic, at 1 with a falling reduced cost, at -1 with a rising one, or at its centre. */
+WIDE static double ratios_of_variables(const window *w, leaving out)
 {
-    const double *restrict alpha = w->alpha, *restrict z = w->z;
-    integer *restrict candidate = w->candidate, m = 0;
-    for (integer j = 0; j < w->Z; j++) {
-        candidate[m] = j;
-        m += (side * alpha[j] * z[j] > NO_PIVOT) | ((z[j] == 0.0) & (fabs(alpha[j]) > NO_PIVOT));
+    const integer Z = w->Z;
+    const double *restrict alpha = w->alpha, *restrict z = w->z, *restrict d = w->d;
+    const double side = out.side, violation = out.violation;
+    double *restrict ratio = w->move, *restrict whole = w->whole;
+    for (integer j = 0; j < Z; j++) {
+        const double size = fabs(alpha[j]), slope = z[j] == 0.0 ? size : side * alpha[j] * z[j];
+        const double own = larger(d[j] * z[j], 0.0) / size, drop = (1.0 + fabs(z[j])) * size;
+        ratio[j] = slope > NO_PIVOT ? own : NAN;
+        whole[j] = drop >= violation ? ratio[j] : NAN;
     }
-    return m;
+    return least_of(whole, Z);
+}
+
+/* The same of the active rows, whose multipliers change their signs, behind those of the variables. */
+static double ratios_of_rows(const window *w, integer q, integer k, leaving out)
+{
+    const integer *rows = w->rows + q * w->K;
+    double *ratio = w->move + w->Z, end = INFINITY;
+    for (integer a = 0; a < k; a++) {
+        const double x = out.side * w->wk[a], size = fabs(x);
+        const int is_one = size > NO_PIVOT && (x > 0.0) == (w->at_upper[a] == 1);
+        ratio[a] = is_one ? larger(w->multiplier[a] / x, 0.0) : NAN;
+        if (is_one && size * (w->upper[rows[a]] - w->lower[rows[a]]) >= out.violation) end = smaller(ratio[a], end);
+    }
+    return end;
 }
 
 /* Breakpoints of the dual step, where a reduced cost or a multiplier changes its sign; their number.
@@ -27,32 +46,21 @@ static integer blocking_variables(const window *w, double side)
  * same. */
 integer collect_breakpoints(const window *w, integer q, integer k, leaving out)
 {
-    const integer *rows = w->rows + q * w->K, count = blocking_variables(w, out.side);
-    breakpoint *points = w->points;
-    double end = INFINITY;
-    integer m = 0;
-    for (integer i = 0; i < count; i++) {
-        const integer j = w->candidate[i];
-        const double z = w->z[j], size = fabs(w->alpha[j]), drop = (1.0 + fabs(z)) * size;
-        const double ratio = larger(w->d[j] * z, 0.0) / size;
-        points[m] = (breakpoint){ratio, size, drop, j};
-        m += ratio <= end + SAME;
-        if (drop >= out.violation) end = smaller(ratio, end);
+    const integer *rows = w->rows + q * w->K, Z = w->Z;
+    const double of_rows = ratios_of_rows(w, q, k, out), end = smaller(ratios_of_variables(w, out), of_rows) + SAME;
+    const double *ratio = w->move;
+    integer *candidate = w->candidate, m = 0;
+    for (integer j = 0; j < Z + k; j++) {
+        candidate[m] = j;
+        m += ratio[j] <= end;
     }
-    for (integer a = 0; a < k; a++) {
-        const double x = out.side * w->wk[a], size = fabs(x);
-        if (!(size > NO_PIVOT) || (x > 0.0) != (w->at_upper[a] == 1)) continue;
-        const double ratio = larger(w->multiplier[a] / x, 0.0), drop = size * (w->upper[rows[a]] - w->lower[rows[a]]);
-        points[m] = (breakpoint){ratio, size, drop, w->Z + a};
-        m += ratio <= end + SAME;
-        if (drop >= out.violation) end = smaller(ratio, end);
-    }
-    integer kept = 0;
     for (integer i = 0; i < m; i++) {
-        points[kept] = points[i];
-        kept += points[i].ratio <= end + SAME;
+        const integer who = candidate[i], a = who - Z;
+        const double size = fabs(a < 0 ? w->alpha[who] : w->wk[a]);
+        const double width = a < 0 ? 1.0 + fabs(w->z[who]) : w->upper[rows[a]] - w->lower[rows[a]];
+        w->points[i] = (breakpoint){ratio[who], size, width * size, who};
     }
-    return kept;
+    return m;
 }
 
 static void swap(breakpoint *a, breakpoint *b)
@@ -62,26 +70,30 @@ static void swap(breakpoint *a, breakpoint *b)
     *b = other;
 }
 
-/* The bits of a number >= 0, which are in the order of such numbers: integers are compared without a branch. */
-static integer key_of(double ratio)
+/* Whether a point comes before another: the nearer one, the larger pivot, the first. Numbers >= 0 are in the order of
+ * their bits. */
+static int is_before(const breakpoint *a, const breakpoint *b)
 {
-    integer key;
-    memcpy(&key, &ratio, sizeof key);
-    return key;
+    integer first, second;
+    memcpy(&first, &a->ratio, sizeof first);
+    memcpy(&second, &b->ratio, sizeof second);
+    if (first != second) return first < second;
+    return a->size > b->size || (a->size == b->size && a->who < b->who);
 }
 
-/* The nearest of the points from `first` on, the largest among equals. */
-static integer nearest(const breakpoint *points, integer first, integer m)
+/* A heap of the last `count` of the points, root[0], root[-1], root[-2] and so on: the one at `at` sinks to its place. */
+static void sink(breakpoint *root, integer count, integer at)
 {
-    integer best = first, least_key = key_of(points[first].ratio);
-    for (integer j = first + 1; j < m; j++) {
-        const integer key = key_of(points[j].ratio);
-        best = key < least_key ? j : best;
-        least_key = key < least_key ? key : least_key;
+    const breakpoint sinking = root[-at];
+    for (;;) {
+        integer child = 2 * at + 1;
+        if (child >= count) break;
+        if (child + 1 < count && is_before(root - child - 1, root - child)) child++;
+        if (is_before(&sinking, root - child)) break;
+        root[-at] = root[-child];
+        at = child;
     }
-    for (integer j = best + 1; j < m; j++)
-        if (key_of(points[j].ratio) == least_key && points[j].size > points[best].size) best = j;
-    return best;
+    root[-at] = sinking;
 }
 
 /* Bound-flipping ratio test: pass breakpoints while the violation stays positive, ties by the largest pivot first.
@@ -94,8 +106,10 @@ entering choose_entering(const window *w, integer m, double violation)
     double total = 0.0, left = violation;
     for (integer j = 0; j < m; j++) total += points[j].drop;
     if (m == 0 || total < violation) return (entering){-1, violation - total};
+    for (integer at = m / 2; at-- > 0;) sink(points + m - 1, m, at);
     for (integer first = 0; first < m; first++) {
-        swap(points + first, points + nearest(points, first, m));
+        swap(points + first, points + m - 1); /* the root and the last leaf */
+        sink(points + m - 1, m - first - 1, 0);
         if (points[first].drop >= left) return (entering){first, larger(left, 0.0)};
         left -= points[first].drop;
     }

@@ -163,6 +163,7 @@ typedef struct { double ratio, size, drop; integer who; } breakpoint;
     Y(breakpoint, SCRATCH, points, J)                                                                                \
     Y(integer, SCRATCH, chosen, J)                                                                                   \
     Y(double, SCRATCH, move, J)                                                                                      \
+    Y(double, SCRATCH, whole, Z)                                                                                     \
     Y(double, SCRATCH, table, K, L)                                                                                  \
     Y(double, SCRATCH, square, K, K)                                                                                 \
     /* a sample while it enters */                                                                                   \
