@@ -4,7 +4,7 @@ Run with ``python -m benchmarks.event_times --samples 100000 --out event_times.j
 not run again, so that it may be interrupted at any time. Run i of a kind is drawn from seed (SEED, kind, i): intervals
 within 90 % of their mean, up to three sensors and the input with clocks of their own, inputs that change between
 readings, w, Delta, p and noise at corners or inside, held from event to event or varying within, and stamps that are
-exact or off by 5 or 50 % of the sampling time (linear: 1 or 30 %, in windows). The truth is an exponential of each
+exact or off by 5 or 50 % of the sampling time (linear: 1 or 30 %). The truth is an exponential of each
 piece of time, or integrated by Runge and Kutta's method. Runaways are counted apart: a reactor from where it ignites,
 and a linear plant that grows beyond a million times what moves it (all of its run, whose bounds of the state its model
 is given). Exit code 1 if anything is excluded or falsified.
@@ -46,7 +46,6 @@ def examine(kind: str, i: int) -> dict[str, Any]:
     """One run: what happened."""
     rng, is_linear = np.random.default_rng([SEED, KINDS.index(kind), i]), kind in OBSERVERS
     off = (0.0, 0.01, 0.3)[i % 3] if is_linear else (0.0, 0.05, 0.5)[i % 3]
-    off = off if kind in ("window", *PLANTS) else 0.0
     samples = RUN.get(kind, 50)
     case = EventPlant(rng).case(samples, 0.3, 0.3 * off) if is_linear else nonlinear_case(kind, rng, samples, off)
     begun, observer = process_time(), OBSERVERS.get(kind, WindowObserver)(case.model, case.first)

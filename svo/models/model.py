@@ -433,4 +433,4 @@ def expect_model(name: str, value: Any, *, jitter: bool = False) -> None:
     """TypeError unless it is a model; ValueError if its sensors' stamps are off, but where ``jitter`` is taken."""
     expect_kind(name, value, UncertainModel, "an UncertainModel")
     if value.jitter is not None and not jitter:
-        raise ValueError(f"{name} has jitter, which only WindowObserver takes; make it without")
+        raise ValueError(f"{name} has jitter, which only observers take, such as WindowObserver; make it without")

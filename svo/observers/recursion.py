@@ -8,35 +8,54 @@ premise of every later alarm; otherwise from the samples whose readings bound th
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
 
 from svo.checks import Array
 from svo.models import NormalForm, UncertainModel
 from svo.models.intervals import transition_rows
+from svo.models.nonlinear import Span
+from svo.models.recent_inputs import RecentInputs
 from svo.models.state_range import within
 from svo.observers.answers import Step
 from svo.observers.base import Observer
+from svo.observers.data import stack_at
 from svo.observers.free_start import Reading
 from svo.observers.readings import Readings
 from svo.observers.saved_state import State
+from svo.observers.stamped import Stamped
 
 Data = TypeVar("Data")
+
+
+class _Taken(NamedTuple, Generic[Data]):
+    """A sample that is read, and where stamps are off, the inputs of that time."""
+
+    data: Data
+    recent: RecentInputs | None
+    around: tuple[Array, Array] | None
+    y: Array
 
 
 class RecursiveObserver(Observer, Generic[Data]):
     """Hooks of a set that is kept from sample to sample; ``Data`` are model and data of a sample."""
 
-    starts_without_set = takes_intervals = True
+    starts_without_set = takes_intervals = takes_jitter = True
 
     _form: NormalForm
     _normal: UncertainModel
     eps: float
+    _wants_next_input: bool
+    _dt: float | None = None  # seconds of the transition that is being taken; None = the model's Ts
     _steps_kept: int = 0  # at least, of a set that is lost
     _readings: Readings | None = None  # of an observer that has lost its set
+    _stamped: Stamped | None = None
+    _recent: RecentInputs | None = None  # where stamps are off
 
     @abstractmethod
-    def _data(self, y: Array, u: Array, schedule: Any) -> Data:
-        """Model and data of a sample, u its own input."""
+    def _data(self, stack: Array, bounds: tuple[Array, Array, Array], u: Array, y: Array) -> Data:
+        """Model, bounds of w and of the noise, and data of a sample, u its own input."""
 
     @abstractmethod
     def _again(self, reading: Reading, number: int) -> Data:
@@ -70,24 +89,56 @@ class RecursiveObserver(Observer, Generic[Data]):
     def _unknown(self) -> Step:
         """The answer without a set."""
 
+    @abstractmethod
+    def _known(self) -> tuple[Array, Array]:
+        """Bounds (n,) of the newest state of a set, or of the first one before it is read; in the user's units."""
+
     # -- samples -----------------------------------------------------------------------------------
 
     def _update(self, y: Array, u: Array, schedule: Any) -> Step:
-        data, known = self._data(y, u, schedule), self._form.inputs(u)
-        if self._readings is not None:
-            return self._without_set(known, data)
-        return self._begin(data) or self._lost(known, data)
+        if self._stamped is not None:
+            self._recent = RecentInputs.none(float(self._stamped.errors.jitter.max()), u.size)
+            self._stamped.box = None if self._readings is not None else Span(*self._known())
+        taken = self._taken(self._recent, y, u, schedule)
+        data, known = taken.data, self._form.inputs(u)
+        step = None if self._readings is not None else self._begin(data) or self._lost(known, data)
+        return self._seen(taken, step or self._without_set(known, data))
 
     def _step(self, u: Array, y: Array, u_next: Array, schedule: Any, end: float | None) -> Step:
-        data, driven = self._data(y, u_next, schedule), self._form.inputs(u)
-        if self._readings is not None:
-            return self._without_set(driven, data)
-        return self._go_on(driven, data) or self._give_up(driven, data)
+        dt, self._dt, recent = self._dt, None, self._recent
+        if self._stamped is not None and recent is not None:
+            recent = recent.moved(u, dt or self.Ts)
+            everywhere = np.full(self.model.n_states, np.inf)
+            known = (-everywhere, everywhere) if self._readings is not None else self._known()
+            self._stamped.moved(Span(*known), u, dt)
+        taken = self._taken(recent, y, u_next, schedule)
+        data, driven = taken.data, self._form.inputs(u)
+        step = None if self._readings is not None else self._go_on(driven, data) or self._give_up(driven, data)
+        return self._seen(taken, step or self._without_set(driven, data))
+
+    def _taken(self, recent: RecentInputs | None, y: Array, u: Array, schedule: Any) -> _Taken[Data]:
+        """A sample that is read, ``recent`` being the inputs before it."""
+        form, stack = self._form, stack_at(self._normal, schedule)
+        lower, upper, noise = self._normal.bounds(schedule)
+        around = None if recent is None else recent.around(u, self._ahead)
+        if self._stamped is not None and around is not None:
+            stack, noise, y = self._stamped.applied(form, stack, noise, y, around, u)
+        data = self._data(stack, (lower, upper, noise), form.inputs(u), form.outputs(y))
+        return _Taken(data, recent, around, y)
+
+    def _seen(self, taken: _Taken[Data], step: Step) -> Step:
+        """An answer, once its sample is taken: its readings may be of inputs to come."""
+        if taken.recent is not None and taken.around is not None:
+            assert self.model.jitter is not None
+            jitter = float(self.model.jitter[~np.isnan(taken.y)].max(initial=0.0))
+            self._recent = taken.recent.read(jitter, taken.around)
+        return step
 
     def _check_interval(self, dt: float) -> None:
         transition_rows(self.model, dt)
 
     def _set_interval(self, dt: float | None) -> None:
+        self._dt = dt
         rows = self._form.state_rows(transition_rows(self.model, dt))
         if self._readings is not None:
             self._readings.move_by(rows)
@@ -151,12 +202,28 @@ class RecursiveObserver(Observer, Generic[Data]):
                 return None  # a proof before the last sample would rest on readings that come after it
         return step
 
+    # -- stamps that are off -------------------------------------------------------------------------
+
+    def _plan_stamps(self) -> None:
+        """What the model's stamps ask for, once the model is known."""
+        origin = self.model.origin
+        stamps = None if origin is None else origin.stamps
+        self._recent, self._stamped = None, None if stamps is None else Stamped(self.model, stamps)
+
+    @property
+    def needs_next_input(self) -> bool:
+        return self._wants_next_input or self._stamped is not None
+
     # -- saved states ------------------------------------------------------------------------------------
 
     def _saved_readings(self) -> dict[str, Array]:
-        return {} if self._readings is None else self._readings.state()
+        recent = {} if self._recent is None else self._recent.state()
+        return recent if self._readings is None else recent | self._readings.state()
 
     def _restore_readings(self, lost: int, state: State) -> None:
+        if self._stamped is not None and self._number >= 0:
+            reach = float(self._stamped.errors.jitter.max())
+            self._recent = RecentInputs.of_state(reach, self.model.n_inputs, state)
         self._readings = None
         if lost:
             self._readings = Readings(self._normal, self.eps, self._steps_kept)

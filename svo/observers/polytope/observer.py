@@ -15,7 +15,7 @@ from polytopes.signatures import options_by_name
 from svo.checks import Array, expect, is_count
 from svo.models import NormalForm, UncertainModel, may_be_nonzero, set_in
 from svo.observers.answers import NO_PROOF, Step
-from svo.observers.data import relative_slack, stack_at
+from svo.observers.data import relative_slack
 from svo.observers.first_states import finite_box
 from svo.observers.free_start import Reading
 from svo.observers.given_units import polytope_proof_out
@@ -126,7 +126,8 @@ class PolytopeObserver(RecursiveObserver[Sample]):
     ) -> None:
         self.model, self._form, self._normal = form.given, form, form.model
         self.horizon, self.max_facets, self.eps = horizon, max_facets, eps
-        self._steps_kept = horizon
+        self._steps_kept, self._wants_next_input = horizon, self.model.uses_input_in_output
+        self._plan_stamps()
         self._recursion: Recursion
         if as_published:
             self._recursion = PublishedRecursion(form.model, horizon, max_facets, eps)
@@ -221,11 +222,9 @@ class PolytopeObserver(RecursiveObserver[Sample]):
 
     # -- the recursion -----------------------------------------------------------------------------
 
-    def _data(self, y: Array, u: Array, schedule: Any) -> Sample:
-        form = self._form
-        stack, (lower, upper, noise) = stack_at(form.model, schedule), form.model.bounds(schedule)
-        disturbances, read = self._disturbances(lower, upper), readable(form.outputs(y))
-        return Sample(self._number, stack, disturbances, noise, form.inputs(u), read, (lower, upper))
+    def _data(self, stack: Array, bounds: tuple[Array, Array, Array], u: Array, y: Array) -> Sample:
+        lower, upper, noise = bounds
+        return Sample(self._number, stack, self._disturbances(lower, upper), noise, u, readable(y), (lower, upper))
 
     def _again(self, reading: Reading, number: int) -> Sample:
         box = reading.w_lower, reading.w_upper
@@ -262,6 +261,10 @@ class PolytopeObserver(RecursiveObserver[Sample]):
         stack = sample.stack.copy()
         stack[:, : self._normal.n_states] = rows
         self._last = sample._replace(stack=stack), outcome
+
+    def _known(self) -> tuple[Array, Array]:
+        joint = self._initial if self._last is None else self._last[1].joint
+        return PolytopeStep(joint, self._form, verdict="consistent").box
 
     def _unknown(self) -> PolytopeStep:
         joint = anywhere(self._normal.n_states, self._normal.physical_range)

@@ -33,17 +33,16 @@ from svo.observers.given_units import arrival_in, arrival_out
 from svo.observers.readings import NO_SAMPLE, OUTGROWN, Readings
 from svo.observers.relinearised_kernel import NOT_MEASURED, NOT_MOVED, Followed, PlantSamples
 from svo.observers.saved_state import arrays_of, numbers
+from svo.observers.stamped import Stamped
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_samples import LogSamples, log_samples
 from svo.observers.window.memory import WindowSettings
 from svo.observers.window.relinearised import Relinearised
 from svo.observers.window.sample import Outgrown, Sample, check_matrices
 from svo.observers.window.setup import arrival_of, needs_next_input, template_rows
-from svo.observers.window.stamped import Stamped
 from svo.observers.window.step import WindowStep
 from svo.observers.window.window import Taken, Window
 
-_ROUNDED_UP = 8.0 * float(np.finfo(float).eps)
 _BLURRED = 1e-3  # of a reading's own width: the share of its slack by the width of the set from which a restart pays
 _BRIEF = 0.05  # seconds of a call of the kernel after which the next may take more samples: Ctrl-C waits for its end
 _MOST_AT_ONCE = 1024  # samples
@@ -477,9 +476,7 @@ class WindowObserver(Observer):
             schedule, y = self._plant.measured(y, u_next, self._number, around)
         stack, (w_lower, w_upper, noise) = self._normal.stack(schedule), self._normal.bounds(schedule)
         if self._stamped is not None and around is not None:
-            y, widening = self._stamped.measured(y, around, u_next)
-            stack = self._stamped.errors.applied(stack, self._stamped.errors.shift / form.y)
-            noise = (noise + widening / form.y) * (1.0 + _ROUNDED_UP)
+            stack, noise, y = self._stamped.applied(form, stack, noise, y, around, u_next)
         u_next = form.inputs(u_next) if self._wants_next_input else u_next  # else zeros
         return Sample(form.inputs(u), u_next, form.outputs(y), stack, noise, w_lower, w_upper, y)
 

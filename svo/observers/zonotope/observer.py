@@ -16,7 +16,7 @@ from svo.checks import Array, expect, is_count
 from svo.models import NormalForm, UncertainModel
 from svo.models.intervals import check_splits
 from svo.observers.answers import NO_PROOF, VerdictName
-from svo.observers.data import relative_slack, stack_at
+from svo.observers.data import relative_slack
 from svo.observers.first_states import first_box
 from svo.observers.free_start import Reading
 from svo.observers.given_units import arrival_in
@@ -91,10 +91,7 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
         self.max_generators, self.max_constraints, self.eps = max_generators, max_constraints, eps
         self._builder = StageBuilder(form, eps)
         self._wants_next_input = needs_next_input(self.model)
-
-    @property
-    def needs_next_input(self) -> bool:
-        return self._wants_next_input
+        self._plan_stamps()
 
     # -- the hooks -------------------------------------------------------------------------------
 
@@ -180,9 +177,8 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
 
     # -- the recursion -----------------------------------------------------------------------------
 
-    def _data(self, y: Array, u: Array, schedule: Any) -> WindowSample:
-        form, model = self._form, self._normal
-        return self._builder.data(stack_at(model, schedule), model.bounds(schedule), form.inputs(u), form.outputs(y))
+    def _data(self, stack: Array, bounds: tuple[Array, Array, Array], u: Array, y: Array) -> WindowSample:
+        return self._builder.data(stack, bounds, u, y)
 
     def _again(self, reading: Reading, number: int) -> WindowSample:
         bounds = reading.w_lower, reading.w_upper, reading.noise
@@ -213,6 +209,10 @@ class ConstrainedZonotopeObserver(RecursiveObserver[WindowSample]):
 
     def _unknown(self) -> ZonotopeStep:
         return self._answer("undecided", None, None)
+
+    def _known(self) -> tuple[Array, Array]:
+        joint = self._stages[-1].joint if self._stages else self._first
+        return ZonotopeStep(joint, self._form, verdict="consistent").box
 
     def _conclude(self, before: tuple[Stage, ...], now: Stage, states: ConstrainedZonotope | None) -> ZonotopeStep:
         """Decide whether anything explains the measurement, and keep what goes on to the next sample."""

@@ -63,6 +63,48 @@ def test_the_truth_is_inside_although_stamps_are_off(seed: int, jitter: float) -
     assert missed(case) == (0, 0)
 
 
+OTHERS = [ConstrainedZonotopeObserver, PolytopeObserver]
+CASES_OF = {ConstrainedZonotopeObserver: ((4, 15), (7, 15), (11, 15)), PolytopeObserver: ((0, 6), (4, 6))}
+
+
+@pytest.mark.parametrize("kind", OTHERS)
+@pytest.mark.parametrize("jitter", [0.01, 0.3])
+def test_the_truth_is_inside_the_sets_of_other_observers(kind: Any, jitter: float) -> None:
+    for seed, samples in CASES_OF[kind]:
+        case = EventPlant(np.random.default_rng([18, seed])).case(samples, 0.3, jitter)
+        assert exclusions(kind(case.model, case.first), case.log) == (0, 0)
+
+
+@pytest.mark.parametrize("kind", OTHERS)
+def test_without_the_widening_other_observers_lose_it_too(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(StampErrors, "widening", lambda self, *_: np.zeros(len(self.jitter)))
+    case = EventPlant(np.random.default_rng([18, 4])).case(10, 0.3, 0.3)
+    assert exclusions(kind(case.model, case.first), case.log) != (0, 0)
+
+
+@pytest.mark.parametrize("kind", [WindowObserver, *OTHERS])
+def test_a_reading_is_worth_the_same_to_each_observer(kind: Any) -> None:
+    observer = kind(cart(jitter=[0.1, 0.0], n=[0.01, 0.5]), FIRST)
+    exact = kind(cart(None, n=[0.01, 0.5]), FIRST)
+    boxes = [np.array(o.update([0.0, np.nan], u=[0.0]).box) for o in (observer, exact)]
+    assert boxes[1][1, 0] == pytest.approx(0.01, rel=1e-6)
+    assert boxes[0][1, 0] == pytest.approx(0.01 + 0.1 * 1.01, rel=1e-6)  # speed within 1, force within 0.1 for 0.1 s
+
+
+@pytest.mark.parametrize("kind", OTHERS)
+def test_other_observers_lose_and_find_their_set(kind: Any) -> None:
+    lost = kind(cart(jitter=[0.1, 0.0]), FIRST)
+    lost.lose_set()
+    log = Log(0.5 * np.arange(6), np.zeros((6, 1)), np.zeros((6, 2)))
+    assert {step.verdict for step in drive(lost, log)} == {"undecided"}
+    known = kind(cart(jitter=[0.1, 0.0], largest=([-9, -9], [9, 9])), FIRST)
+    known.lose_set()
+    assert known.run(log).verdicts[-1] == "consistent"
+    with pytest.raises(ValueError, match="input changes"):
+        known.step([0.0], [0.0, 0.0], u_next=[1.0], dt=0.05)
+    assert known.step([0.0], [0.0, 0.0], u_next=[0.0], dt=0.05).verdict == "consistent"
+
+
 def test_without_the_widening_the_truth_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(StampErrors, "widening", lambda self, *_: np.zeros(len(self.jitter)))
     lost = [missed(EventPlant(np.random.default_rng([18, seed])).case(30, 0.3, 0.3)) != (0, 0) for seed in (0, 4, 7)]
@@ -219,20 +261,24 @@ def test_inputs_to_come_are_checked_before_anything_is_taken(bounds: list[Any], 
         exact.update([0.0, 0.0], u_range=[[0.0], [1.0]])
 
 
-@pytest.mark.parametrize("kind", ["linear", "nonlinear"])
-def test_a_saved_state_goes_on_bit_for_bit(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "of"),
+    [("linear", WindowObserver), ("nonlinear", WindowObserver), *(("linear", other) for other in OTHERS)],
+)
+def test_a_saved_state_goes_on_bit_for_bit(kind: str, of: Any) -> None:
+    samples = 30 if of is WindowObserver else 8
     if kind == "linear":
-        case = EventPlant(np.random.default_rng([18, 4])).case(30, 0.3, 0.1)
+        case = EventPlant(np.random.default_rng([18, 4])).case(samples, 0.3, 0.1)
     else:
-        case = nonlinear_case("pendulum", np.random.default_rng(6), 30, jitter=0.4)
-    whole, cut = (WindowObserver(case.model, case.first) for _ in range(2))
+        case = nonlinear_case("pendulum", np.random.default_rng(6), samples, jitter=0.4)
+    whole, cut, half = of(case.model, case.first), of(case.model, case.first), samples // 2
     boxes = [np.array(step.box).tobytes() for step in drive(whole, case.log)]
-    for _, step in zip(range(15), drive(cut, case.log), strict=False):
+    for _, step in zip(range(half), drive(cut, case.log), strict=False):
         assert step.box is not None
-    for again in (deepcopy(cut), WindowObserver.from_state_dict(case.model, cut.state_dict())):
-        assert [np.array(step.box).tobytes() for step in drive(again, case.log, start=15)] == boxes[15:]
+    for again in (deepcopy(cut), of.from_state_dict(case.model, cut.state_dict())):
+        assert [np.array(step.box).tobytes() for step in drive(again, case.log, start=half)] == boxes[half:]
     with pytest.raises(ValueError, match="another model"):
-        WindowObserver.from_state_dict(case.model.replace(n=2.0 * np.asarray(case.model.n)), cut.state_dict())
+        of.from_state_dict(case.model.replace(n=2.0 * np.asarray(case.model.n)), cut.state_dict())
 
 
 def test_a_set_that_is_lost_has_no_reading_whose_stamp_is_off() -> None:
@@ -246,12 +292,6 @@ def test_a_set_that_is_lost_has_no_reading_whose_stamp_is_off() -> None:
 
 
 # -- what is refused -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", [ConstrainedZonotopeObserver, PolytopeObserver])
-def test_other_observers_take_exact_stamps(kind: Any) -> None:
-    with pytest.raises(ValueError, match="jitter, which only WindowObserver takes"):
-        kind(cart(), FIRST)
 
 
 def test_what_knows_nothing_of_stamps_refuses_them() -> None:

@@ -1,7 +1,7 @@
-"""A linear model in a window whose sensors have stamps that may be off: what each sample's rows are widened by.
+"""A linear model whose sensors have stamps that may be off: what each sample's rows are widened by.
 
-The widening rests on where the state is before the sample is read: the window's bounds at the sample before, moved on
-by the transition. Everything here is in the user's units.
+The widening rests on where the state is before the sample is read: the observer's bounds at the sample before, moved on
+by the transition. Everything here is in the user's units, unless it says otherwise.
 """
 
 from __future__ import annotations
@@ -9,14 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from svo.checks import Array
-from svo.models import UncertainModel
+from svo.models import NormalForm, UncertainModel
 from svo.models.intervals import transition_rows
 from svo.models.nonlinear import Span
 from svo.models.stamps import StampErrors
 
+_ROUNDED_UP = 8.0 * float(np.finfo(float).eps)
+
 
 class Stamped:
-    """What a window observer asks about the stamps of a linear model.
+    """What an observer asks about the stamps of a linear model.
 
     Parameters
     ----------
@@ -56,6 +58,14 @@ class Stamped:
         if box is None or not _is_bounded(box):
             return np.where(self.errors.is_off, np.nan, y), np.zeros(len(y))
         return y, self.errors.widening((box.lower, box.upper), around, u)
+
+    def applied(
+        self, form: NormalForm, stack: Array, noise: Array, y: Array, around: tuple[Array, Array], u: Array
+    ) -> tuple[Array, Array, Array]:
+        """Stack and noise of a sample, both in normal form, and its readings, as `measured` makes them."""
+        y, widening = self.measured(y, around, u)
+        stack = self.errors.applied(stack, self.errors.shift / form.y)
+        return stack, (noise + widening / form.y) * (1.0 + _ROUNDED_UP), y
 
 
 def _is_bounded(box: Span) -> bool:
