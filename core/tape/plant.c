@@ -31,6 +31,7 @@ void plant_open(plant *p, const double *block, Memory scratch)
     p->before = span_in(&scratch, p->n);
     p->image = span_in(&scratch, p->n);
     p->rest = scratch;
+    p->path = NULL, p->room = 0;
 }
 
 void plant_hold(plant *p, const double *u)

@@ -39,6 +39,8 @@ typedef struct {
     tape f, h;
     span z, rate, before, image; /* scratch: (x, w, u), f, and of a step where it began and what f makes of it */
     Memory rest;                 /* of the scratch */
+    double *path;                /* NULL, or room for the size and boxes of so many substeps, (1 + 4 n) each */
+    integer room;
 } plant;
 
 void plant_open(plant *p, const double *block, Memory scratch);

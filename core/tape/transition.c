@@ -12,7 +12,7 @@
 #include "powers.h"
 #include "vectors.h"
 
-static const integer FINEST = 4096; /* substeps are multiples of so small a part of the sample */
+static const integer FINEST = 4096; /* substeps are multiples of so small a part of the sample, in proofs too */
 static const integer MOST_SUBSTEPS = 200;
 static const integer BEFORE_FLAT = 16;  /* substeps that states have which no number of substeps would give lines */
 static const double WORTH_ANOTHER = 0.1; /* of the width of the set: a remainder beyond it is worth a second substep */
@@ -258,6 +258,16 @@ static void stand_still(const plant *p, transition *t)
     t->substeps = 0;
 }
 
+/* The substep that is the next of a path: its size, the box that it begins in, and the one that it keeps to. */
+static void note_substep(const plant *p, integer at, integer size)
+{
+    if (at >= p->room) return;
+    const double *ends[] = {p->before.low, p->before.high, p->z.low, p->z.high};
+    double *noted = p->path + at * (1 + 4 * p->n);
+    *noted++ = (double)size;
+    for (int i = 0; i < 4; i++) copy(noted + i * p->n, ends[i], p->n);
+}
+
 /* Over a time T, in at least so many substeps (a power of two), from t->start; `other` is room for another. */
 static int move(plant *p, double T, integer least_substeps, transition *t, transition *other, Memory scratch,
                 outcome *found)
@@ -278,6 +288,7 @@ static int move(plant *p, double T, integer least_substeps, transition *t, trans
             const double norm = flatten(p, h, &d);
             take_local(p, &d);
             exponential_take(p->n, d.J, h, d.unit, norm, reach_in_units(p, &d), scratch, &e);
+            note_substep(p, now->substeps, size);
             if (!advance(p, now, &d, &e, h, next, found)) return 0;
             transition *last = now;
             now = next, next = last, done += size;
@@ -421,6 +432,27 @@ EXPORTED integer fdi_plant_transition(const double *block, double *scratch, cons
     if (!take(&p, T, &t, &other, &finer, found)) return -found->code;
     give(&p, &t, result);
     return t.substeps;
+}
+
+/* The substeps of the transition of these states that has so many: parts of FINEST of the sample, and the boxes (2, n) that
+ * each begins in and keeps to, as rows of `path`. Returns whether there is one. */
+EXPORTED integer fdi_plant_path(const double *block, double *scratch, const double *low, const double *high,
+                                const double *u, double T, integer substeps, double *path)
+{
+    plant p;
+    transition other, finer;
+    outcome ignored;
+    plant_open(&p, block, (Memory){scratch, 0});
+    transition t = all_in(&p, &other, &finer);
+    plant_hold(&p, u);
+    p.path = path, p.room = substeps;
+    for (integer least = 1; least <= 2; least++) {
+        copy(t.start.low, low, p.n);
+        copy(t.start.high, high, p.n);
+        cut_by_physical(&p, t.start);
+        if (move(&p, T, least, &t, &other, p.rest, &ignored) && t.substeps == substeps) return 1;
+    }
+    return 0;
 }
 
 /* The same from the states that are known (n) in two ways, where these have a common one, else from the first: only the

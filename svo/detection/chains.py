@@ -22,6 +22,7 @@ from svo.observers.given_units import arrival_out
 from svo.observers.window.certificate import OnWindow, WindowCertificate
 from svo.observers.window.chain_starts import Start
 from svo.observers.window.evidence import ArrivalSet
+from svo.observers.window.linearised_prover import LinearisedProver
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
 from svo.observers.window.prover import ChainProver, ProvenChain
@@ -213,15 +214,17 @@ def _prove(models: PlantModels, alarm: Alarm) -> tuple[ProvenChain | None, str]:
     first = observer.first_set
     if first is None:
         return None, f"the observer {alarm.observer!r} ({type(observer).__name__}) does not say its first_set"
-    if isinstance(observer.model, NonlinearModel):
-        return None, _NOT_FROM_THE_FIRST.format("a nonlinear model")
     if observer.jitter is not None:
         return None, _NOT_FROM_THE_FIRST.format("a model with jitter")
     begun = _beginning(bank, alarm, log, first)
     if begun is None:
         where = f"at sample {alarm.sample}"
         return None, f"run again over the log, the plant's bank does not ask its observer {alarm.observer!r} {where}"
-    prover = ChainProver(ModelOnLog(observer.model, first, log), *begun)
+    prover: ChainProver | LinearisedProver
+    if isinstance(observer.model, NonlinearModel):
+        prover = LinearisedProver(observer.model, log, *begun)
+    else:
+        prover = ChainProver(ModelOnLog(observer.model, first, log), *begun)
     found = prover.prove(alarm.sample)
     if found is None:
         splits = isinstance(observer, WindowObserver) and observer.sign_split

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from svo.checks import Array
+from svo.functions.operations import Op
+from svo.functions.tape import Tape
 from svo.isolation import Bank
 from svo.logs.log import Log
 from svo.models import UncertainModel
@@ -20,7 +22,7 @@ from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.proof_steps import encode_set
 from svo.observers.window.setup import joint_rows
-from svo.plant import MonitoredPlant, OffersModels
+from svo.plant import MonitoredPlant
 from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
 from svo.store.values import encode_value
@@ -52,8 +54,8 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
         log = scheduled(plant.scheduler(), log)
     observers = _observers(bank, log)
     if not observers:
-        why = f"plant {plant.name!r} has no observer of a linear model with exact stamps, and no other is written yet"
-        raise ValueError(why + _other_models(plant))
+        why = f"plant {plant.name!r} has no observer of a model with exact stamps, and no other is written yet"
+        raise ValueError(why)
     return {
         "format": FORMAT,
         "plant": plant.name,
@@ -66,25 +68,57 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
     }
 
 
-def _other_models(plant: MonitoredPlant) -> str:
-    """What to do instead, where a plant offers it."""
-    if not isinstance(plant, OffersModels):
-        return ""
-    return f"; choose models {' or '.join(kind for kind in plant.model_kinds if kind != plant.model_kind)}"
-
-
 def _observers(bank: Bank, log: Log | None) -> dict[str, Any]:
     return {
-        name: _described(name, observer.first_set, observer.model, log)
+        name: observer_record(name, observer.first_set, observer.model, log)
         for name, observer in bank.observers.items()
-        if observer.first_set is not None and not isinstance(observer.model, NonlinearModel) and observer.jitter is None
+        if observer.first_set is not None and observer.jitter is None
+    }
+
+
+def observer_record(
+    name: str, first: ArrivalSet, model: UncertainModel | NonlinearModel, log: Log | None
+) -> dict[str, Any]:
+    """The entry of an observer, at the scheduling values of a log where its model is scheduled."""
+    return _equations(first, model) if isinstance(model, NonlinearModel) else _described(name, first, model, log)
+
+
+def _equations(first: ArrivalSet, model: NonlinearModel) -> dict[str, Any]:
+    """Of a nonlinear model: bounds as those of its linearisations, whose last disturbances are what these leave out."""
+    carrier = model.carrier
+    found = _entries(first, carrier, *_bounds(carrier, None))
+    valid, varying = model.valid_range, np.flatnonzero(model.flow.varying).tolist()
+    return found | {
+        "noise": encode_value(model.noise[None]),
+        "equations": {
+            "continuous": model.continuous,
+            "varying": varying,
+            "valid": None if valid is None else [encode_value(valid.lower), encode_value(valid.upper)],
+            "f": tape_record(model.flow.tape),
+            "h": tape_record(model.reading),
+        },
+    }
+
+
+def tape_record(tape: Tape) -> dict[str, Any]:
+    """A tape as JSON can hold it."""
+    op = tape.op.tolist()
+    return {
+        "op": op,
+        "operands": [of[: max(1, Op(o).operands)] for o, of in zip(op, tape.operands.tolist(), strict=True)],
+        "constants": encode_value(tape.constants),
+        "rows": tape.outputs.tolist(),
     }
 
 
 def _described(name: str, first: ArrivalSet, model: UncertainModel, log: Log | None) -> dict[str, Any]:
     if model.is_scheduled and (log is None or log.schedule is None):
         raise ValueError(f"the model {name!r} is scheduled; give the log, whose scheduling values it is about")
-    lower, upper, noise = _bounds(model, log)
+    return {"matrices": _matrices(model, first, log), **_entries(first, model, *_bounds(model, log))}
+
+
+def _entries(first: ArrivalSet, model: UncertainModel, lower: Array, upper: Array, noise: Array) -> dict[str, Any]:
+    """Sizes, bounds, rows on w, and sets."""
     polytope = model.disturbance_polytope
     rows = (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0)) if polytope is None else joint_rows(polytope)
     delta = np.array([u.bounds for u in model.uncertainties]).reshape(-1, 2)
@@ -94,7 +128,6 @@ def _described(name: str, first: ArrivalSet, model: UncertainModel, log: Log | N
         "inputs": model.n_inputs,
         "outputs": model.n_outputs,
         "disturbances": model.n_disturbances,
-        "matrices": _matrices(model, first, log),
         "delta": encode_value(delta),
         "noise": encode_value(noise),
         "w_lower": encode_value(lower),

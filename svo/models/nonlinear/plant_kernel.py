@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polytopes import native
 from polytopes.native import Address, Entries, Given, Integer, Real
@@ -30,6 +31,7 @@ _measured = native.function(
 _moved = native.function(
     "fdi_plant_moved", Address, Address, *[Given] * 2, *[Entries] * 2, Given, Real, *[Entries] * 2, returns=Integer
 )
+_path = native.function("fdi_plant_path", Address, Address, *[Given] * 3, Real, Integer, Entries, returns=Integer)
 
 # As in `core/tape/plant.h`.
 _TOO_MANY_SUBSTEPS, _OUTSIDE_VALID, _NOT_PHYSICAL, _TOO_WIDE = range(1, 5)
@@ -112,6 +114,17 @@ class PlantKernel:
         square, E = result[: n * n].reshape(n, n), result[n * (n + 1) : n * (n + 1 + nw)].reshape(n, nw)
         R, *ends = result[n * (n + 1 + nw) :].reshape(5, n)
         return Transition(square, result[n * n : n * (n + 1)], E, R, Span(*ends[:2]), Span(*ends[2:]), substeps)
+
+    def path(self, lower: Array, upper: Array, u: Array, T: float, substeps: int) -> tuple[NDArray[np.int64], Array]:
+        """Of the substeps of a transition: parts in 4096 (substeps,) of its time T, and boxes (substeps, 2, 2, n).
+
+        The state is in the first box of each when the substep begins, and keeps to the second.
+        """
+        n = self._sizes[0]
+        found = np.empty((substeps, 1 + 4 * n))
+        if not _path(self.address, native.scratch(self.room), lower, upper, u, T, substeps, found):
+            raise ValueError(f"no transition of {substeps} substeps; expected the number of one that there is")
+        return found[:, 0].astype(np.int64), found[:, 1:].reshape(substeps, 2, 2, n)
 
     def output(self, lower: Array, upper: Array, u: Array) -> LinearOutput:
         """Of all states of a box.

@@ -16,7 +16,7 @@ from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.window import Window
 from svo.store.values import encode_value
 
-_SIDES = ("upper", "lower")
+SIDES = ("upper", "lower")
 
 
 class ProofSteps:
@@ -35,12 +35,12 @@ class ProofSteps:
     """
 
     def __init__(self, start: Start, template: Array) -> None:
-        self.steps: list[dict[str, Any]] = [_start_step(start, template)]
+        self.steps: list[dict[str, Any]] = [start_step(start, template)]
         self._channels: dict[int, bytes] = {}
 
     def channel(self, q: int, side: int, value: float, proof: WindowCertificate) -> None:
         """A bound of s of a channel of a window's newest sample, upper (0) or lower (1)."""
-        self._add("s", proof, sample=proof.last, channel=q, side=_SIDES[side], value=value)
+        self._add("s", proof, sample=proof.last, channel=q, side=SIDES[side], value=value)
 
     def arrival(self, window: Window, program: int, sample: int, proof: WindowCertificate) -> None:
         """A bound of the state at a sample: along an axis, or a row of the template."""
@@ -48,7 +48,7 @@ class ProofSteps:
         row, side = program // 2, program % 2
         value = float(arrays["new_lower" if side else "new_upper"][row])
         unit = form.x[row] if row < len(form.x) else 1.0
-        self._add("x", proof, unit, sample=sample, row=row, side=_SIDES[side], value=value * unit)
+        self._add("x", proof, unit, sample=sample, row=row, side=SIDES[side], value=value * unit)
 
     def alarm(self, proof: WindowCertificate) -> None:
         """The falsification."""
@@ -66,10 +66,11 @@ class ProofSteps:
                 self.steps.append({"step": "channels", "sample": k, "owner": proof.owner.tolist(), **factors})
         if "value" in entries:
             entries["value"] = float(entries["value"]).hex()
-        self.steps.append({"step": kind, **entries, **_multipliers(proof, unit)})
+        self.steps.append({"step": kind, **entries, **multipliers(proof, unit)})
 
 
-def _start_step(start: Start, template: Array) -> dict[str, Any]:
+def start_step(start: Start, template: Array) -> dict[str, Any]:
+    """The step that begins a chain."""
     step: dict[str, Any] = {"step": "start", "sample": start.sample, "from": start.kind}
     if start.kind == "assumed":
         step |= {"set": encode_set(start.set), "because": start.because}
@@ -84,8 +85,8 @@ def encode_set(of: ArrivalSet) -> dict[str, Any]:
     return dict(encode_value(of))
 
 
-def _multipliers(c: WindowCertificate, unit: float) -> dict[str, Any]:
-    """Those of the rows, times a power of two; of lines only where there is one."""
+def multipliers(c: WindowCertificate, unit: float) -> dict[str, Any]:
+    """Entries of a step: multipliers of rows, times a power of two, and of lines where there is one."""
     where, values = [], []
     for k, s in enumerate(c.samples):
         for q, side in np.argwhere(s.on_channel).tolist():

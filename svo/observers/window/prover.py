@@ -44,8 +44,8 @@ class ProvenChain(Shown):
     start : Start
     bounds : int
         Bounds of states and channels that it takes.
-    certificate : WindowCertificate
-        Of its last window.
+    certificate : WindowCertificate or None
+        Of its last window; None where one reading excludes what is known.
     steps : list of dict
         As `docs/proof_format.md` has them.
     given : tuple of str
@@ -54,7 +54,7 @@ class ProvenChain(Shown):
 
     start: Start
     bounds: int
-    certificate: WindowCertificate
+    certificate: WindowCertificate | None
     steps: list[dict[str, Any]]
     given: tuple[str, ...]
 
@@ -169,7 +169,7 @@ class BoundProver:
         arrays, i, lower = window.memory.arrays, program // 2, program % 2 == 1
         target = window.memory.base + window.memory.size.block
         bound = rational(-arrays["new_lower"][i] if lower else arrays["new_upper"][i])
-        proof, proven = _proven(window, program, target, -arrays["T"][i] if lower else arrays["T"][i])
+        proof, proven = proven_bound(window, program, target, -arrays["T"][i] if lower else arrays["T"][i])
         self._steps.arrival(window, program, target + window.origin, proof)
         what = f"arrival bound {program} of sample {target + window.origin}"
         self._count(proven is not None and proven <= bound, what)
@@ -184,7 +184,7 @@ class BoundProver:
         bases = [4 * size.nt + 2 * q + side, None] if is_open else [None]
         holds = False
         for basis in bases:
-            proof, proven = _proven(window, basis, time, f[: size.n])
+            proof, proven = proven_bound(window, basis, time, f[: size.n])
             if proven is not None and proven + known <= bound:
                 holds = True
                 self._steps.channel(q, side, end, proof)
@@ -209,7 +209,9 @@ def _known_part(memory: Memory, f: Array) -> fmpq:
     return total
 
 
-def _proven(window: Window, basis: int | None, sample: int, direction: Array) -> tuple[WindowCertificate, fmpq | None]:
+def proven_bound(
+    window: Window, basis: int | None, sample: int, direction: Array
+) -> tuple[WindowCertificate, fmpq | None]:
     """The bound of a direction (in normal form) at a sample that multipliers prove about the model as it is given.
 
     They are those of the program solved last, whose basis is given; None: without any. The sample is one of the

@@ -1,0 +1,61 @@
+"""Boxes that a state keeps to within a substep, stated so large that whoever computes otherwise finds them to hold."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from svo.checks import Array
+from svo.functions.tape import Unenclosed
+from svo.models.nonlinear import NonlinearModel, Undecided
+from svo.models.state_range import within
+
+PARTS = 4096  # of a sample: what substeps are counted in
+_ROOM = (0.02, 0.1, 0.3, 1.0)  # of what a trajectory moves: what a box is larger by, in turn
+_MARGIN = 1e-3  # of that room: at least so much of it is left
+_ROUNDED = 1e-13  # of the terms of a sum in floats: more than it rounds
+
+
+def hinted(model: NonlinearModel, before: Array, box: Array, u: Array, h: float) -> Array:
+    """A box (2, n) around ``box`` that the plant makes, within h from ``before`` on, a box in its interior of.
+
+    Raises
+    ------
+    Undecided
+        If none of those that are tried is.
+    """
+    wide = box[1] - box[0]
+    moved = np.maximum(wide - (before[1] - before[0]), 0.0)
+    for share in _ROOM:
+        room = share * moved + 1e-9 * wide + 1e-13 * np.abs(box).max(axis=0) + 1e-200
+        found = np.array(within(model.physical_range, box[0] - room, box[1] + room))
+        image = _image(model, before, found, u, h)
+        if image is not None and _is_inside(model, image, found, _MARGIN * room):
+            return found
+    raise Undecided("no box was found that is plainly one that the state keeps to")
+
+
+def _is_inside(model: NonlinearModel, image: Array, box: Array, margin: Array) -> bool:
+    """But for faces of the physical range."""
+    low, high = image[0] - margin > box[0], image[1] + margin < box[1]
+    physical = model.physical_range
+    if physical is not None:
+        low, high = low | (box[0] <= physical.lower), high | (box[1] >= physical.upper)
+    return bool((low & high).all())
+
+
+def _image(model: NonlinearModel, before: Array, box: Array, u: Array, h: float) -> Array | None:
+    """before + [0, h] f, as `docs/proof_format.md` has it; None where f has no bounds."""
+    flow, n = model.flow, model.n_states
+    lower, upper = (np.concatenate([end, w, u]) for end, w in zip(box, flow.w, strict=True))
+    try:
+        f = flow.tape.forms(lower, upper, free=n + len(flow.varying))
+    except Unenclosed:
+        return None
+    own, radius = np.diagonal(f.g[:, :n]), 0.5 * (upper - lower)[: f.g.shape[1]]
+    others = np.abs(f.g) @ radius - np.abs(own) * radius[:n]
+    lost = _ROUNDED * (np.abs(f.k) + np.abs(f.g) @ radius + np.abs(f.low) + np.abs(f.high))
+    at_low = f.k + own * (before[0] - f.centre[:n]) - others + f.low - lost
+    at_high = f.k + own * (before[1] - f.centre[:n]) + others + f.high + lost
+    low = np.where(own <= 0.0, np.maximum(at_low, f.lower), f.lower)
+    high = np.where(own <= 0.0, np.minimum(at_high, f.upper), f.upper)
+    return np.array([before[0] + h * np.minimum(low, 0.0), before[1] + h * np.maximum(high, 0.0)])

@@ -1,0 +1,241 @@
+"""Alarms of nonlinear models, proven from the equations, checked by the program that is not of ours; forgeries."""
+
+from __future__ import annotations
+
+import ast
+import json
+import sys
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from checkers import CHECK, FOLDER
+from proof_cases import Made, answer, proven, steps_of, with_steps
+from typer.testing import CliRunner
+
+from polytopes import HPolytope
+from svo import ArchitectureI, NonlinearModel, WindowObserver, find_plant
+from svo.cli import app
+from svo.logs.log import Log
+from tests.svo.models.nonlinear_plants import CASES, Case
+
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
+Files = tuple[Path, Path, Path]
+
+
+class Nonlinear(Made):
+    """A plant of one nonlinear model."""
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case.model, horizon=6)
+        self.case = case
+
+    def bank(self, noise: str) -> ArchitectureI:
+        start = HPolytope.box(self.case.x0 - self.case.spread, self.case.x0 + self.case.spread)
+        return ArchitectureI(WindowObserver(self.model, start, horizon=self._horizon), {})
+
+
+def run_of(case: Case, fails: int = 25) -> Log:
+    """A log whose sensors jump; the noise is small beside it."""
+    log = case.model.simulate(case.x0, case.inputs(fails + 8), np.random.default_rng(3))
+    log.y[fails:] += 8.0 * case.model.noise + 0.02 * np.abs(log.y[fails:])
+    return log
+
+
+def growth() -> Case:
+    """A map: x(k+1) = f(x(k))."""
+    model = NonlinearModel(
+        lambda x, u, w, p: [p[0] * x[0] * (1.0 - x[0]) + 0.1 * u[0] + w[0], 0.5 * x[1] + x[0] / (1.0 + x[0])],
+        lambda x, w: [x[0] * x[0] + 0.5 * w[0], x[1]], states=["a", "b"], inputs=["u"], disturbances=["w"],
+        parameters={"rate": (2.9, 3.1)}, constant=True, n=[0.01, 0.02], w=[0.01], continuous=False,
+        valid=([0.0, -1.0], [1.2, 2.0]), largest=([0.1, 0.0], [1.0, 1.0]),
+    )  # fmt: skip
+    return Case(model, np.array([0.6, 0.5, 3.0]), np.array([0.05, 0.05, 0.1]), lambda k: [0.1 * np.sin(k)])
+
+
+def claims(files: Files) -> list[tuple[str, int, list[str]]]:
+    """What the checker takes as proven, and given what; none if it refuses."""
+    plant = json.loads(files[1].read_text())
+    try:
+        found = CHECK.check(files[0], plant, CHECK.Log(files[2], plant["columns"]))
+    except CHECK.REFUSALS:
+        return []
+    return [(observer, sample, chain.premises) for observer, sample, chain in found]
+
+
+@pytest.fixture(scope="module")
+def reactor(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    case = CASES["cstr"]()
+    files = proven(Nonlinear(case), run_of(case), tmp_path_factory.mktemp("reactor"))
+    assert files is not None
+    return files
+
+
+def test_the_second_file_is_short_and_needs_the_first_and_the_standard_library() -> None:
+    text = (FOLDER / "svo_check_nonlinear.py").read_text(encoding="utf-8")
+    assert text.count("\n") < 500
+    names = {
+        (alias.name if isinstance(node, ast.Import) else node.module or "").partition(".")[0]
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+    }
+    assert names <= sys.stdlib_module_names | {"svo_check"}
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "cstr"])
+def test_alarms_of_nonlinear_plants_are_proven(name: str, tmp_path: Path) -> None:
+    case = CASES[name]()
+    files = proven(Nonlinear(case), run_of(case), tmp_path)
+    assert files is not None
+    ((observer, sample, premises),) = claims(files)
+    assert (observer, sample) == ("nominal", 25)
+    assert any("physical" in premise for premise in premises) is (case.model.physical_range is not None)
+
+
+def test_a_map_with_a_constant_parameter_is_proven(tmp_path: Path) -> None:
+    case = growth()
+    log = case.model.simulate(case.x0, case.inputs(20), np.random.default_rng(3))
+    log.y[12:, 1] += 0.4
+    files = proven(Nonlinear(case), log, tmp_path)
+    assert files is not None
+    ((_, _, premises),) = claims(files)
+    assert "the equations hold where the state is in their range" in premises
+
+
+def test_the_commands_prove_the_two_tanks(tmp_path: Path) -> None:
+    plant, log, out = EXAMPLES / "two_tanks.toml", EXAMPLES / "two_tanks.csv", tmp_path / "found"
+    run = lambda *words: CliRunner().invoke(app, [str(word) for word in words])  # noqa: E731
+    proof, described = tmp_path / "proof.jsonl.gz", tmp_path / "plant.json"
+    assert run("detect", plant, log, "--out", out).exit_code == 0
+    done = run("verify", out / "alarms.jsonl", "--full", log, "--write-proof", proof)
+    assert done.exit_code == 0
+    assert "2 of 2 alarms proven" in done.output
+    assert run("describe", plant, "--out", described).exit_code == 0
+    code, text = answer(proof, described, log)
+    assert code == 0, text
+    assert "2 of 2 alarms proven" in text
+    assert "from sample 53 on, where the state is in its physical range" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_the_eclipse_is_proven_by_its_equations(seed: int, tmp_path: Path) -> None:
+    plant = find_plant("eclipse")
+    for fault in ("elevator", "alpha", "dynamics"):
+        (tmp_path / fault).mkdir()
+        files = proven(plant, plant.simulate(fault, "soft", "quiet", seed), tmp_path / fault, noise="quiet")
+        assert files is not None
+        code, text = answer(*files)
+        assert code == 0, text
+
+
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+Steps = list[dict[str, Any]]
+
+
+def of_kind(steps: Steps, kind: str) -> Steps:
+    return [step for step in steps if step.get("step") == kind]
+
+
+def scaled(kind: str, name: str, factor: float, add: float = 0.0) -> Callable[[Steps], None]:
+    """An array of a step of the middle of the proof with other numbers."""
+
+    def change(steps: Steps) -> None:
+        found = of_kind(steps, kind)
+        array = found[len(found) // 2][name]
+        array["hex"] = " ".join((float.fromhex(w) * factor + add).hex() for w in array["hex"].split(" "))
+
+    return change
+
+
+def of_another_sample(kind: str, *names: str) -> Callable[[Steps], None]:
+    def change(steps: Steps) -> None:
+        found = of_kind(steps, kind)
+        for name in names:
+            found[3][name] = found[-1][name]
+
+    return change
+
+
+def narrowed(steps: Steps) -> None:
+    """A box that a trajectory leaves."""
+    box = of_kind(steps, "transition")[4]["boxes"]
+    numbers = np.array([float.fromhex(w) for w in box["hex"].split(" ")]).reshape(box["shape"])
+    middle = numbers.mean(axis=1, keepdims=True)
+    box["hex"] = " ".join(float(v).hex() for v in (middle + 0.8 * (numbers - middle)).ravel())
+
+
+def dropped(which: Callable[[dict[str, Any]], bool]) -> Callable[[Steps], None]:
+    return lambda steps: steps.__setitem__(slice(None), [s for s in steps if not which(s)])
+
+
+def tighter(steps: Steps) -> None:
+    step = of_kind(steps, "x")[-1]
+    step["value"] = (float.fromhex(step["value"]) - (1e-3 if step["side"] == "upper" else -1e-3)).hex()
+
+
+FORGED: dict[str, Callable[[Steps], None]] = {
+    "a remainder of a transition is too small": scaled("transition", "R", 0.5),
+    "a remainder of a transition is zero": scaled("transition", "R", 0.0),
+    "a matrix is another": scaled("transition", "A", 1.01),
+    "a constant is another": scaled("transition", "a", 1.0, 0.01),
+    "what w does is left out": scaled("transition", "E", 0.0),
+    "the matrices are of another sample": of_another_sample("transition", "A", "a", "E", "R"),
+    "the boxes are of another sample": of_another_sample("transition", "boxes"),
+    "a box does not hold the trajectory": narrowed,
+    "a box is a point": scaled("transition", "boxes", 0.0, 1.0),
+    "a substep is missing": lambda steps: of_kind(steps, "transition")[2].update(substeps=[2048]),
+    "a substep is negative": lambda steps: of_kind(steps, "transition")[2].update(substeps=[8192, -4096]),
+    "an output has another slope": scaled("output", "C", 1.01),
+    "an output has another constant": scaled("output", "c", 1.0, 1.0),
+    "a transition is missing": dropped(lambda s: s.get("step") == "transition" and s["sample"] == 24),
+    "outputs are missing": dropped(lambda s: s.get("step") == "output"),
+    "boxes are missing": lambda steps: of_kind(steps, "transition")[2].pop("boxes"),
+    "no bounds of states": dropped(lambda s: s.get("step") == "x"),
+    "states within less": tighter,
+    "a step is of a sample after the log": lambda steps: of_kind(steps, "transition")[2].update(sample=10**6),
+}
+
+
+@pytest.mark.parametrize("what", FORGED)
+def test_a_forged_linearisation_is_refused(reactor: Files, what: str) -> None:
+    steps = deepcopy(steps_of(reactor[0]))
+    FORGED[what](steps)
+    assert claims((with_steps(reactor[0], steps), *reactor[1:])) == []
+
+
+def test_the_reactor_is_proven(reactor: Files) -> None:
+    assert [claim[:2] for claim in claims(reactor)] == [("nominal", 25)]
+
+
+def changed(model: Callable[[dict[str, Any]], None], files: Files) -> Files:
+    plant = json.loads(files[1].read_text())
+    model(plant["observers"]["nominal"])
+    path = files[1].with_name("changed.json")
+    path.write_text(json.dumps(plant))
+    return files[0], path, files[2]
+
+
+@pytest.mark.parametrize("what", ["wider w", "more noise", "varying", "narrower valid", "a map", "another function"])
+def test_a_proof_of_another_model_is_refused(reactor: Files, what: str) -> None:
+    def change(record: dict[str, Any]) -> None:
+        told = record["equations"]
+        if what == "wider w":
+            record["w_upper"]["hex"] = " ".join(["0x1.0p+4", *record["w_upper"]["hex"].split(" ")[1:]])
+        elif what == "more noise":
+            record["noise"]["hex"] = (5.0).hex()
+        elif what == "varying":
+            told["varying"] = [0, 1]
+        elif what == "narrower valid":
+            told["valid"] = [{"shape": [2], "hex": f"0 {low.hex()}"} for low in (340.0, 350.0)]
+        elif what == "a map":
+            told["continuous"] = False
+        else:
+            told["f"]["op"] = [12 if op == 9 else op for op in told["f"]["op"]]
+
+    assert claims(changed(change, reactor)) == []
