@@ -77,14 +77,11 @@ def primitive(rows: Integers) -> Integers:
 
 def _pointed_rays(G: Integers, max_rays: int) -> Integers:
     """Extreme rays of a pointed cone ``{y : G y <= 0}``: G has full column rank."""
-    G = G[_good_order(G)]
-    start = _independent(G)
-    rays = _simplex(G[start])
-    found: Integers | None = None
-    if G.dtype != object and rays.dtype != object:
-        found = kernel.double_description(G, np.array(start), rays, max_rays)
+    found: Integers | None = None if G.dtype == object else kernel.pointed_cone(G, max_rays)
     if found is None:
-        found = _large_rays(G.astype(object), start, rays.astype(object), max_rays)
+        G = G[_good_order(G)]
+        start = _independent(G)
+        found = _large_rays(G.astype(object), start, _simplex(G[start]).astype(object), max_rays)
     if len(found) > max_rays:
         raise UndecidedError(
             f"the double description of {len(G)} rows in {G.shape[1]} coordinates passes its limit of {max_rays} rays."

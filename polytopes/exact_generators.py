@@ -11,9 +11,8 @@ from polytopes.general_position import WIDE
 from polytopes.integers import Floats, integer_rows, maybe_short, short
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, generators_of
+from polytopes.short_sets import SHORT_RAYS
 
-SHORT_RAYS = 2_000
-"""Rays of the double description beyond which a set of short rows is left to floats, if they can decide."""
 LONG_RAYS = 500
 """The same for longer rows."""
 _FEW_RAYS = 200

@@ -1,38 +1,82 @@
-"""Vertices and facets of sets in general position, proven to be all by the compiled core (`core/polytopes/cone.c`).
+"""Vertices, volumes and hulls in floats by the compiled core, where it is certain which rows meet where.
 
-In general position each vertex of a set lies on n rows, and each facet of a hull on n points.  Sets that are not, or
-nearly not, are left to other methods.
+In general position (n rows in each vertex, n points in each facet) all are proven (`core/polytopes/cone.c`).  Elsewhere
+the double description goes by floats of which every sign is told by a bound (`core/polytopes/near_cone.c`).  Sets that
+are nearly one thing and nearly another are left to other methods.
 """
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from polytopes import kernel
 from polytopes.checks import Floats
 from polytopes.kernel import Indices
-from polytopes.linear_program import Program
+from polytopes.native import Address, Entries, Given, Integer, Real, address, function, scratch
+from polytopes.prepared import PreparedRows
 
 WIDE = 1e-6
 """Radius of a largest ball, relative to the size of b, from which rounding is small beside it."""
 
 _MOST = 100_000  # vertices or facets
 _APART = 1e-9  # distance of a vertex from a row, or of a facet from a point, below which it counts as nearly on it
+_ROOM = 120  # vertices or facets for which there is room from the start
+_NO_ROOM = -3  # why there is no answer yet
+
+_vertices = function(
+    "fdi_prepared_vertices", *[Integer] * 2, Entries, *[Real] * 2, Integer, Entries, *[Address] * 2, returns=Integer
+)
+_hull = function("fdi_point_hull", *[Integer] * 2, Given, Real, Integer, Entries, Address, returns=Integer)
+_vertices_room, _hull_room = (
+    lru_cache(1024)(function(f"fdi_{name}_room", *[Integer] * 3, returns=Integer))
+    for name in ("prepared_vertices", "point_hull")
+)
 
 
-def simple_vertices(program: Program) -> Floats | None:
-    """Vertices (k, n) of a set without equalities, in lexicographic order; None if they are not proven to be all.
+def listed_vertices(rows: PreparedRows) -> Floats | None:
+    """Vertices (k, n) of a set, in lexicographic order; None where it is not certain that it is bounded by them."""
+    points = _listed(rows, None)
+    return None if points is None else points[np.lexsort(points.T[::-1])]
 
-    The proof is one that the set is bounded too.  Thin sets are left to others.
-    """
-    if program.flat.pivots or not program.fat or program.interior.radius <= WIDE * program.size:
+
+def summed_volume(rows: PreparedRows) -> float | None:
+    """The volume of a set, of simplices between its vertices; None if it is not bounded for sure, or they are many."""
+    volume = np.empty(1)
+    return volume.item() if _listed(rows, address(volume)) is not None and volume.item() >= 0.0 else None
+
+
+def _listed(rows: PreparedRows, volume: int | None) -> Floats | None:
+    m, n = rows.A.shape
+
+    def call(room: int, points: Floats) -> int:
+        block = scratch(_vertices_room(n, m, room))
+        count: int = _vertices(n, m, rows.block, WIDE, _APART, room, points, volume, block)
+        return count
+
+    return _with_room(call, n)
+
+
+def rows_around(V: Floats) -> Floats | None:
+    """Rows ``[A, b]`` (f, n + 1) of the hull of points (k, n), outward; None where its facets are not certain."""
+    k, n = V.shape
+    if k <= n:
         return None
-    d, m = program.AT.shape
-    G = np.zeros((d + 1, m + 1))
-    G[:d, :m], G[d, :m], G[d, m] = program.AT, -program.rhs, -1.0
-    found = kernel.cone_rays(G, np.append(program.centre, 1.0), True, _MOST)
-    if found is None or not _apart(found[2], program.size):
-        return None
-    points = program.lift(found[0][:, :-1])
-    return points[np.lexsort(points.T[::-1])]
+    return _with_room(lambda room, rows: _hull(n, k, V, _APART, room, rows, scratch(_hull_room(n, k, room))), n + 1)
+
+
+def _with_room(call: Callable[[int, Any], int], width: int) -> Floats | None:
+    """What a call finds, given room for as much as it needs."""
+    room = _ROOM
+    while True:
+        found = np.empty((room, width))
+        count = call(room, found)
+        if count >= 0:
+            return found[:count]
+        if count != _NO_ROOM or room >= _MOST:
+            return None
+        room = min(4 * room, _MOST)
 
 
 def simplicial_facets(points: Floats) -> tuple[Floats, Indices] | None:
@@ -47,13 +91,9 @@ def simplicial_facets(points: Floats) -> tuple[Floats, Indices] | None:
     offsets = points - middle
     G = np.vstack([offsets.T, np.full((1, k), -1.0)])
     found = kernel.cone_rays(G, np.append(np.zeros(n), 1.0), False, _MOST)
-    if found is None or not _apart(found[2], 1.0):
+    if found is None or not found[2] > _APART:
         return None
     rays, simplices, _ = found
     rows = rays / np.linalg.norm(rays[:, :-1], axis=1, keepdims=True)
     rows[:, -1] = -rows[:, -1] - rows[:, :-1] @ middle
     return rows, simplices
-
-
-def _apart(slack: float, size: float) -> bool:
-    return slack > _APART * size

@@ -10,11 +10,13 @@ from polytopes.checks import Floats
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.exact_generators import integer_form
 from polytopes.fractions_given import exact_table, integers_of, primitive_row
+from polytopes.general_position import rows_around
 from polytopes.hull import Spread, outer_rows, point_offsets
-from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, lowest_bit, short
+from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, lowest_bit, short, short_vector
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
 from polytopes.outward import float_rows
 from polytopes.rows import Rows, Table
+from polytopes.short_sets import short_hull
 from polytopes.shown import Shown
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
@@ -105,6 +107,12 @@ def rows_of_fractions(V: Any, rays: Any) -> Table:
     return float_rows(ExactGenerators(distinct(vertices), distinct(cone), cone[:0]))
 
 
+def exact_hull(V: Floats) -> Table | None:
+    """Rows A, b, C, d of the hull of points (k, n) of few bits that span the space, exact; else None."""
+    rows = short_hull(V) if short_vector([*V[0].tolist(), 1.0]) else None
+    return None if rows is None else (rows[:, :-1], rows[:, -1], np.empty((0, V.shape[1])), np.empty(0))
+
+
 def rows_of_generators(V: Floats, rays: Floats) -> Table:
     """Rows A, b, C, d of ``conv(V) + cone(rays)``, k >= 1 points.
 
@@ -115,6 +123,10 @@ def rows_of_generators(V: Floats, rays: Floats) -> Table:
     if unit:
         A, b, C, d = rows_of_generators(np.ldexp(V, -unit), rays)
         return A, np.ldexp(b, unit), C, np.ldexp(d, unit)
+    if not len(rays):
+        known = short_hull(V) if short_vector([*V[0].tolist(), 1.0]) else rows_around(V)
+        if known is not None:
+            return known[:, :-1], known[:, -1], np.empty((0, V.shape[1])), np.empty(0)
     points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
     directions = integer_rows(rays[rays.any(axis=1)])
     exact = short(points) or len(directions) > 0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from polytopes.checks import Floats
 from polytopes.frame import Oracle, inverted, principal_axes, unit_frame
-from polytopes.general_position import simplicial_facets
+from polytopes.general_position import rows_around, simplicial_facets
 from polytopes.qhull import point_hull
 from polytopes.redundancy import irredundant
 
@@ -75,6 +75,16 @@ def outer_rows(spread: Spread, offsets: Callable[[Floats], Floats]) -> tuple[Flo
     across = spread.across
     rows = np.vstack([spread.normals(), across, -across])
     return rows, offsets(rows)
+
+
+def normals_around(V: Floats) -> Floats:
+    """Unit normals (m, n) of the facets of the hull of points (k, n), and of a subspace that they nearly lie in."""
+    known = rows_around(V)
+    if known is not None:
+        return known[:, :-1]
+    spread = Spread.of(V)
+    facets, across = spread.normals(), spread.across
+    return np.vstack([facets, across, -across])
 
 
 def spread_with(V: Floats, rays: Floats) -> Spread:

@@ -8,6 +8,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
+from polytopes import kernel
 from polytopes.checks import Floats
 from polytopes.double_description import Integers, primitive
 from polytopes.errors import UndecidedError
@@ -18,7 +19,6 @@ SHORT = 2**32
 _LARGE = 32  # bits
 _BITS = 53  # of a float
 _EXACT = 2.0**_BITS
-_WIDE = 2.0**62  # integers that an int64 holds
 _FARTHEST = 1000  # powers of two that a float may be multiplied by
 
 
@@ -26,11 +26,12 @@ def integer_rows(table: Floats) -> Integers:
     """Each row (m, n) as primitive integers, up to a positive factor; machine integers where all of them fit."""
     if not table.size:
         return np.zeros(table.shape, dtype=np.int64)
+    small = kernel.integer_rows(table)
+    if small is not None:
+        return small
     lowest, highest = lowest_bit(table).min(axis=1, initial=0), np.frexp(table)[1].max(axis=1, initial=0)
     if (lowest > -_FARTHEST).all() and (highest - lowest < _FARTHEST).all():
         whole = np.ldexp(table, -lowest[:, None])
-        if np.abs(whole).max() < _WIDE:
-            return primitive(whole.astype(np.int64))
         return primitive(np.array([[int(v) for v in row] for row in whole.tolist()], dtype=object))
     rows = np.zeros(table.shape, dtype=object)
     for i, values in enumerate(table.tolist()):

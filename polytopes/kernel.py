@@ -44,10 +44,11 @@ _cone_rays = function(
     "fdi_cone_rays", *[Integer] * 2, *[Given] * 2, *[Integer] * 2, *[Entries] * 3, Address, returns=Integer
 )
 _cone_rays_room = _room("cone_rays", 3)
-_double_description = function(
-    "fdi_double_description", *[Integer] * 2, *[Given] * 3, *[Integer] * 2, Entries, Address, returns=Integer
+_pointed_cone = function(
+    "fdi_pointed_cone", *[Integer] * 2, Given, *[Integer] * 2, Entries, Address, returns=Integer
 )
-_double_description_room = _room("double_description", 3)
+_pointed_cone_room = _room("pointed_cone", 3)
+_integer_rows = function("fdi_integer_rows", *[Integer] * 2, Given, Entries, returns=Integer)
 _exponents = function("fdi_exponents", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, Address)
 _exponents_room = _room("exponents", 2)
 _scaled = function("fdi_scaled", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, Address, returns=Integer)
@@ -258,29 +259,31 @@ def cone_rays(GT: Floats, inner: Floats, bounded: bool, most_rays: int) -> tuple
         room = min(4 * room, most_rays)
 
 
-def double_description(rows: Indices, start: Indices, simplex: Indices, most_rays: int) -> Indices | None:
+def pointed_cone(rows: Indices, most_rays: int) -> Indices | None:
     """Extreme rays (k, d) of a pointed cone ``{y : rows y <= 0}``, primitive; None if int64 could overflow.
 
     Parameters
     ----------
     rows : integers (m, d)
-        In the order in which they are taken.
-    start : integers (d,)
-        Numbers of independent rows.
-    simplex : integers (d, d)
-        The rays of these rows: ray k lies on all but row k.
+        Of rank d.
     most_rays : int
         Beyond it, at any step, the method ends with one more.
     """
     (m, d), room = rows.shape, _RAYS
     while True:
-        rays, block = np.empty((room, d), np.int64), scratch(_double_description_room(d, m, room))
-        k = _double_description(d, m, rows, start, simplex, most_rays, room, rays, block)
+        rays, block = np.empty((room, d), np.int64), scratch(_pointed_cone_room(d, m, room))
+        k = _pointed_cone(d, m, rows, most_rays, room, rays, block)
         if k == _OVERFLOW:
             return None
         if k != _MORE_ROOM:
             return rays[: most_rays + 1 if k == _MORE_RAYS else k]
         room *= 4
+
+
+def integer_rows(table: Floats) -> Indices | None:
+    """Each row (m, d) as primitive integers, up to a positive factor; None if one does not fit into int64."""
+    rows = np.empty(table.shape, np.int64)
+    return rows if _integer_rows(*table.shape, table, rows) else None
 
 
 def exponents(rows: Floats, rhs: Floats) -> tuple[Indices, Indices]:

@@ -29,17 +29,22 @@ Indices = NDArray[np.int64]
 _KERNEL_VARIABLES = 40
 _KERNEL_ENTRIES = 200_000
 _EPS = float(np.finfo(np.float64).eps)
-_WIDEST = 4.0  # of the size of b: by duality no radius is beyond max |b_i| / |a_i|, and no norm is below 1/2
-_CLEAN = 1e-9  # relative gap between a maximum and its bound that is still accepted from floats
-_SHARP = 1e-6  # the same gap, of the radius of a largest ball
+WIDEST = 4.0  # of the size of b: by duality no radius is beyond max |b_i| / |a_i|, and no norm is below 1/2
+CLEAN = 1e-9  # relative gap between a maximum and its bound that is still accepted from floats
+SHARP = 1e-6  # the same gap, of the radius of a largest ball
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
-_SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
+SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
 _NOISE = 1e-15  # width, relative to the coordinates, that may be rounding
 _EVEN_POWERS = 2  # exponents of two by which the units of the axes may differ from even ones
 _UNEVEN = 256.0  # ratio of the widths along two axes from which the axes are scaled
 
 OPTIMAL, UNBOUNDED, UNDECIDED = "optimal", "unbounded", "undecided"
 _NAMES = {kernel.OPTIMAL: OPTIMAL, kernel.UNBOUNDED: UNBOUNDED}
+
+
+def small(variables: int, rows: int) -> bool:
+    """Whether programs of that size go to the core."""
+    return variables <= _KERNEL_VARIABLES and variables * rows <= _KERNEL_ENTRIES
 
 
 def warm_up() -> None:
@@ -145,7 +150,7 @@ class Program:
 
     @derived
     def _small(self) -> bool:
-        return self.AT.shape[0] <= _KERNEL_VARIABLES and self.AT.size <= _KERNEL_ENTRIES
+        return small(*self.AT.shape)
 
     @derived
     def _highs(self) -> HighsProgram:
@@ -163,10 +168,10 @@ class Program:
             origin = np.zeros(free)
             return Interior(self.lift(origin), origin, np.inf, np.zeros(0), True)
         if self._small:
-            z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), _WIDEST)
+            z, radius, status, weights = kernel.interior(self.AT, self.rhs, self.norms, np.zeros(free), WIDEST)
             if status == kernel.OPTIMAL:
                 return Interior(self.lift(z), z, radius, weights, True)
-        z, radius, weights, reliable = large_program.largest_ball(self.AT, self.rhs, self.norms, _WIDEST * self.size)
+        z, radius, weights, reliable = large_program.largest_ball(self.AT, self.rhs, self.norms, WIDEST * self.size)
         return Interior(self.lift(z), z, radius, weights, reliable)
 
     @derived
@@ -193,7 +198,7 @@ class Program:
         """
         if self.AT.shape[0] < 2 or not self.consistent or not self._small:
             return self
-        if self.interior.radius > _SMALL_BALL * self.size:
+        if self.interior.radius > SMALL_BALL * self.size:
             return self
         program = self._evened()
         for _ in range(3):
@@ -309,7 +314,7 @@ class Program:
             bounds = bounds.widened(found.weights @ of_rhs, beside + found.weights @ of_rows)
         reach = self._reach if bounds.beside.any() else np.zeros(self.powers.size)
         values, gap, terms = bounds.gaps(reduced, found.points, reach)
-        room = np.minimum(_CLEAN * terms, _SHARP * max(self.interior.radius, 0.0) + 8.0 * _EPS * terms)
+        room = np.minimum(CLEAN * terms, SHARP * max(self.interior.radius, 0.0) + 8.0 * _EPS * terms)
         for q in np.flatnonzero(~((gap <= room) & np.isfinite(values))):
             if found.status[q] == OPTIMAL:
                 found.status[q] = UNDECIDED
@@ -389,7 +394,7 @@ class Program:
         if bound is None:
             return None
         value, gap = rounded_up(bound[0]), float(to_floats([bound[0]])[0] - direction @ point)
-        if not gap <= _CLEAN * (float(np.abs(direction) @ np.abs(point)) + abs(value)):
+        if not gap <= CLEAN * (float(np.abs(direction) @ np.abs(point)) + abs(value)):
             return None
         return OPTIMAL, value, point, weights
 

@@ -4,13 +4,14 @@ import numpy as np
 
 from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError
-from polytopes.generators import in_integers
-from polytopes.hull import Spread
+from polytopes.generators import exact_hull, in_integers
+from polytopes.hull import normals_around
 from polytopes.minkowski_weyl import total
 from polytopes.outer_supports import upper_supports
 from polytopes.outward import float_rows
 from polytopes.projection import project
 from polytopes.rows import Rows, Table, nothing
+from polytopes.short_sets import Corners
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
 
@@ -33,6 +34,9 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
     """
     if not (known_nonempty(P) and known_nonempty(Q)):
         return nothing(P.dim)
+    known = _of_exact_corners(P.corners, Q.corners)
+    if known is not None:
+        return known
     first, second = P.exact, Q.exact
     if first is not None and second is not None and len(first.vertices) * len(second.vertices) <= _MAX_SUMS:
         return float_rows(total(first, second))
@@ -41,6 +45,17 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
     normals = _normals(P, Q)
     supports = upper_supports(P, normals) + upper_supports(Q, normals)
     return normals, np.nextafter(supports, np.inf), np.empty((0, P.dim)), np.empty(0)
+
+
+def _of_exact_corners(V: Corners | None, W: Corners | None) -> Table | None:
+    """The sum of sets whose vertices, and their sums, are floats of few bits; None if they are not such."""
+    if not (V and W and V.exact and W.exact and len(V.points) * len(W.points) <= _MAX_SUMS):
+        return None
+    first, second = V.points[:, None], W.points
+    sums = first + second
+    part = sums - first
+    rounded = (first - (sums - part)) + (second - part)
+    return None if rounded.any() else exact_hull(sums.reshape(-1, sums.shape[2]))
 
 
 def _normals(P: Rows, Q: Rows) -> Floats:
@@ -52,9 +67,7 @@ def _normals(P: Rows, Q: Rows) -> Floats:
     except ProjectionLimitError:
         pass
     sums = vertices(P)[:, None, :] + vertices(Q)
-    spread = Spread.of(sums.reshape(-1, n))
-    facets, across = spread.normals(), spread.across
-    return np.vstack([facets, across, -across])
+    return normals_around(sums.reshape(-1, n))
 
 
 def _normals_by_elimination(P: Rows, Q: Rows) -> Floats:

@@ -27,7 +27,8 @@ from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
 from polytopes.exact_generators import few_generators
 from polytopes.fourier_motzkin import eliminate
-from polytopes.hull import Spread, normals_by_supports, outer_rows
+from polytopes.generators import exact_hull
+from polytopes.hull import normals_around, normals_by_supports
 from polytopes.minkowski_weyl import shadow
 from polytopes.outer_supports import upper_supports
 from polytopes.outer_template import outer_template
@@ -40,6 +41,7 @@ METHODS = ("auto", "fourier-motzkin", "convex-hull", "vertices")
 _UNBOUNDED = "the projection is unbounded; only method='fourier-motzkin' can describe it."
 _CHEAP_ROWS = 3000  # rows of one step; beyond, another method was faster in every measured case
 _LISTED = 6  # coordinates up to which the vertices of dense rows are few enough to list
+_FEW_CORNERS = 200  # vertices up to which their hull is taken where they are exact
 _FEW = 5  # coordinates up to which listing them always was the fastest
 _COSTLY_SHADOW = 4  # coordinates of a shadow from which one hull of all vertices beats several of support points
 
@@ -71,6 +73,11 @@ def project(
     n, k = P.dim, len(keep)
     if not known_nonempty(P):
         return np.zeros((1, k)), np.array([-1.0]), np.empty((0, k)), np.empty(0)
+    corners = P.corners if method == "auto" else None
+    if corners is not None and corners.exact and len(corners.points) <= _FEW_CORNERS:
+        known = exact_hull(corners.points[:, list(keep)])
+        if known is not None:
+            return known
     few = few_generators(P.A, P.b, P.C, P.d, P.program) if method == "auto" else None
     if few is not None:
         return float_rows(shadow(few, list(keep)))
@@ -113,7 +120,8 @@ def _project_body(P: Rows, k: int, inner: Floats, method: str, max_rows: int, ou
     if method == "auto":
         return _project_automatically(P, k, inner, max_rows, outer)
     if method == "vertices":
-        return outer_rows(Spread.of(vertices(P)[:, :k]), lambda normals: upper_supports(P, _lifted(normals, P.dim)))
+        normals = normals_around(np.ascontiguousarray(vertices(P)[:, :k]))
+        return normals, upper_supports(P, _lifted(normals, P.dim))
     if method == "convex-hull":
         normals = normals_by_supports(lambda directions: _shadow_points(P, directions), inner[:k])
         bounds = upper_supports(P, _lifted(normals, P.dim))

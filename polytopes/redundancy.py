@@ -52,6 +52,8 @@ def minimal_rows(P: Rows) -> Table:
         return nothing(P.dim)
     kept = kept_rows(P)
     rows, fixed, flat = kept.inequalities, kept.equalities, kept.implicit
+    if not (fixed.size or flat.size):
+        return P.A[rows], P.b[rows], P.C[:0], P.d[:0]
     return P.A[rows], P.b[rows], np.vstack([P.C[fixed], P.A[flat]]), np.append(P.d[fixed], P.b[flat])
 
 
@@ -63,6 +65,8 @@ def kept_rows(P: Rows) -> KeptRows:
     EmptySetError
         If P is empty: no choice of its rows is minimal for sure.
     """
+    if P.prepared is not None:
+        return KeptRows(facets(P.program), *np.empty((2, 0), np.int64))
     implicit = np.array(implicit_equalities(P), dtype=np.int64)
     flat = made_explicit(P, implicit.tolist()) if implicit.size else P
     others = np.setdiff1d(np.arange(P.b.size), implicit)

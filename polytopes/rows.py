@@ -1,6 +1,8 @@
 """The rows of an H-polytope: validated once, read-only, with what is derived from them kept beside them."""
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import isfinite
 from typing import Any, Self
 
 import numpy as np
@@ -12,14 +14,17 @@ from polytopes.derived import derived
 from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
 from polytopes.fractions_given import hold_fractions, rows_of_floats
-from polytopes.general_position import simple_vertices
+from polytopes.general_position import listed_vertices
 from polytopes.integers import maybe_short
 from polytopes.lengths import evened, lengths
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.preparation import prepare
+from polytopes.prepared import PreparedRows, both_ways
+from polytopes.short_sets import Corners, short_vertices
 from polytopes.value import Value
 
+_FLOAT = np.dtype(np.float64)
 Table = tuple[Floats, Floats, Floats, Floats]
 """Rows A, b, C, d: what the operations hand to the constructor of a set."""
 
@@ -47,6 +52,10 @@ class Rows(Value):
     d: Floats
 
     def __init__(self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None) -> None:
+        given = _as_they_are(A, b) if d is None or (type(d) is np.ndarray and d.shape == (0,)) else None
+        if given is not None and (C is None) == (d is None) and (C is None or np.shape(C) == given[2].shape):
+            self.__dict__.update(zip("AbCd", given, strict=True))
+            return
         if hold_fractions(A, b):
             A, b = rows_of_floats("Ab", dense(A), b)
         if hold_fractions(C, d):
@@ -82,9 +91,14 @@ class Rows(Value):
         return int(self.A.shape[1])
 
     @derived
+    def prepared(self) -> PreparedRows | None:
+        """The rows prepared by the core, where it settles at once that a ball fits in."""
+        return None if self.d.size else PreparedRows.of(self.A, self.b)
+
+    @derived
     def program(self) -> Program:
         """The rows prepared for linear programs."""
-        return prepare(self.A, self.b, self.C, self.d)
+        return prepare(*self.table) if self.prepared is None else self.prepared.program()
 
     @derived
     def as_box(self) -> Box | None:
@@ -113,21 +127,53 @@ class Rows(Value):
     @derived
     def wide(self) -> bool:
         """Whether floats know the nonempty set well: full-dimensional, wide against their rounding, bounded."""
-        return wide(self.program)
+        if self.prepared is None:
+            return wide(self.program)
+        along = self.prepared.supports(both_ways(self.dim))
+        return wide(self.program) if along is None else bool((along < np.inf).all())
 
     @derived
     def exact(self) -> ExactGenerators | None:
         """The generators in integers, where the set is computed with in integers; see `exact_generators`."""
+        if self.prepared is not None and not maybe_short(self.A, self.b) and self.wide:
+            return None
         return exact_generators(self.A, self.b, self.C, self.d, self.program)
 
     @derived
-    def simple(self) -> Floats | None:
-        """The vertices (k, n) of a set in general position whose rows are not short; see `general_position`."""
-        return None if maybe_short(self.A, self.b) else simple_vertices(self.program)
+    def corners(self) -> Corners | None:
+        """The vertices of a bounded full-dimensional set of short rows; see `short_sets`."""
+        return None if self.d.size or not maybe_short(self.A, self.b) else short_vertices(self.A, self.b)
+
+    @derived
+    def listed(self) -> Floats | None:
+        """The vertices (k, n) of a bounded set that floats know well, and whose rows are not short."""
+        return None if self.prepared is None or maybe_short(self.A, self.b) else listed_vertices(self.prepared)
 
     def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
         """The same equalities with other inequalities ``A x <= b``: A (m, n), b (m,)."""
         return type(self)(A, b, self.C, self.d)
+
+
+def _as_they_are(A: Any, b: Any) -> Table | None:
+    """Read-only copies of finite arrays of floats that fit, in a fraction of the time; None: look closely."""
+    if type(A) is not np.ndarray or type(b) is not np.ndarray or not A.dtype == b.dtype == _FLOAT:
+        return None
+    if A.ndim != 2 or b.ndim != 1 or len(A) != len(b) or not A.shape[1]:
+        return None
+    rows, rhs = A.copy(), b.copy()
+    if not isfinite(np.vdot(rows, rows) + np.vdot(rhs, rhs)):  # squares may also leave the floats
+        return None
+    rows.setflags(write=False)
+    rhs.setflags(write=False)
+    return rows, rhs, *_no_equalities(rows.shape[1])
+
+
+@lru_cache(256)
+def _no_equalities(n: int) -> tuple[Floats, Floats]:
+    C, d = np.empty((0, n)), np.empty(0)
+    C.setflags(write=False)
+    d.setflags(write=False)
+    return C, d
 
 
 def dense(matrix: Any) -> Any:

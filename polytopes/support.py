@@ -13,6 +13,7 @@ from polytopes.duality import equality_multipliers
 from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.lengths import evened, lengths
 from polytopes.linear_program import UNDECIDED, Maxima
+from polytopes.prepared import both_ways
 from polytopes.rows import Rows
 from polytopes.shown import Shown
 
@@ -58,7 +59,7 @@ def known_nonempty(P: Rows) -> bool:
     UndecidedError
         If that could not be decided.
     """
-    if P.as_box is not None or P.program.fat:
+    if P.as_box is not None or P.prepared is not None or P.program.fat:
         return True
     if P.decided.status == "undecided":
         raise UndecidedError(f"cannot tell whether the set is empty: {P.decided.reason}")
@@ -69,6 +70,9 @@ def maxima(P: Rows, directions: Floats) -> Maxima | None:
     """Maxima of the linear forms over P; None if P is empty.  UndecidedError if one could not be found."""
     if not known_nonempty(P):
         return None
+    settled = None if P.prepared is None else P.prepared.maxima(directions)
+    if settled is not None:
+        return settled
     result = P.program.maximise(directions)
     if UNDECIDED in result.status:
         k = result.status.index(UNDECIDED)
@@ -84,11 +88,19 @@ def support(P: Rows, directions: ArrayLike) -> float | Floats:
     """``h_P(c)`` for one direction (n,) or a batch (k, n): a float or an array (k,)."""
     array = _directions(P, directions)
     batch = array[None] if array.ndim == 1 else array
-    values = _of_box(P, batch)
-    if values is None:
-        result = maxima(P, batch)
-        values = np.full(len(batch), -np.inf) if result is None else result.values
+    values = supports(P, batch)
     return float(values[0]) if array.ndim == 1 else values
+
+
+def supports(P: Rows, directions: Floats) -> Floats:
+    """``h_P(c)`` (k,) along directions (k, n), rounded up; -inf if P is empty."""
+    values = _of_box(P, directions)
+    if values is None and P.prepared is not None:
+        values = P.prepared.supports(directions)
+    if values is None:
+        result = maxima(P, directions)
+        values = np.full(len(directions), -np.inf) if result is None else result.values
+    return values
 
 
 def _of_box(P: Rows, directions: Floats) -> Floats | None:
@@ -125,20 +137,17 @@ def bounding_box(P: Rows) -> tuple[Floats, Floats]:
     if P.as_box is not None:
         lower, upper = P.as_box.corners.copy()
         return lower, upper
-    axes = np.eye(P.dim)
-    result = maxima(P, np.vstack([axes, -axes]))
-    if result is None:
+    values = supports(P, both_ways(P.dim))
+    if values[0] == -np.inf:
         raise EmptySetError("the empty set has no bounding box; ask emptiness() first.")
-    return -result.values[P.dim :], result.values[: P.dim]
+    return -values[P.dim :], values[: P.dim]
 
 
 def is_bounded(P: Rows) -> bool:
     """Whether P lies in a ball (the empty set does): its support along the 2 n axes is finite."""
     if P.as_box is not None:
         return P.as_box.bounded
-    axes = np.eye(P.dim)
-    result = maxima(P, np.vstack([axes, -axes]))
-    return result is None or bool(np.isfinite(result.values).all())
+    return bool((supports(P, both_ways(P.dim)) < np.inf).all())
 
 
 def chebyshev(P: Rows) -> Ball:
@@ -153,6 +162,9 @@ def chebyshev(P: Rows) -> Ball:
     """
     if not known_nonempty(P):
         raise EmptySetError("the empty set has no largest ball; ask emptiness() first.")
+    ball = None if P.prepared is None else P.prepared.ball()
+    if ball is not None:
+        return Ball(*ball)
     flat = P.program.flat
     if not flat.free:
         return Ball(flat.point.copy(), 0.0)

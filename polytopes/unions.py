@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes.checks import Floats, listed, real_array
-from polytopes.generators import in_integers
+from polytopes.generators import exact_hull, in_integers
 from polytopes.hpolytope import HPolytope
-from polytopes.hull import Spread, outer_rows
+from polytopes.hull import normals_around
 from polytopes.minkowski_weyl import union
 from polytopes.outer_supports import upper_supports
 from polytopes.outward import float_rows
@@ -43,16 +43,21 @@ def _hull_rows(sets: Sequence[Rows]) -> Table:
         return nothing(n)
     if len(some) == 1:
         return some[0].A, some[0].b, some[0].C, some[0].d
-    if not all(P.simple is not None for P in some) and (
+    known = _of_exact_corners(some)
+    if known is not None:
+        return known
+    if not all(P.listed is not None for P in some) and (
         all(P.exact is not None for P in some) or not all(is_bounded(P) for P in some)
     ):
         return float_rows(union([in_integers(P) for P in some]))
-    points = np.vstack([vertices(P) for P in some])
-    return (
-        *outer_rows(Spread.of(points), lambda normals: _largest_supports(some, normals)),
-        np.empty((0, n)),
-        np.empty(0),
-    )
+    normals = normals_around(np.vstack([vertices(P) for P in some]))
+    return normals, _largest_supports(some, normals), np.empty((0, n)), np.empty(0)
+
+
+def _of_exact_corners(sets: Sequence[Rows]) -> Table | None:
+    """The hull of sets whose vertices are floats of few bits; None if they are not such."""
+    corners = [P.corners for P in sets]
+    return exact_hull(np.vstack([V.points for V in corners if V])) if all(V and V.exact for V in corners) else None
 
 
 def _largest_supports(sets: Sequence[Rows], normals: Floats) -> Floats:

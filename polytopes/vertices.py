@@ -31,10 +31,12 @@ def vertices(P: Rows) -> Floats:
     UnboundedError
         If P is unbounded.
     """
+    if P.corners is not None:
+        return P.corners.points.copy()
     if not known_nonempty(P):
         return np.empty((0, P.dim))
-    if P.simple is not None:
-        return P.simple.copy()
+    if P.listed is not None:
+        return P.listed.copy()
     if not is_bounded(P):
         raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
     if P.exact is not None:

@@ -7,11 +7,13 @@ from polytopes.affine_hull import affine_dim
 from polytopes.errors import UndecidedError
 from polytopes.exact import to_floats
 from polytopes.frame import unit_body
-from polytopes.hull import Spread
+from polytopes.general_position import summed_volume
+from polytopes.integers import maybe_short
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.qhull import points_volume
 from polytopes.rows import Rows
-from polytopes.support import is_bounded, known_nonempty
+from polytopes.short_sets import short_volume
+from polytopes.support import is_bounded
 from polytopes.vertices import listed, vertices
 
 
@@ -23,10 +25,12 @@ def volume(P: Rows) -> float:
     UndecidedError
         If the set is too thin for such coordinates, and not computed with in integers.
     """
-    if known_nonempty(P) and P.dim > 1 and P.simple is not None:
-        spread = Spread.of(P.simple)
-        points = spread.offsets @ spread.axes.T / spread.sizes
-        return float(points_volume(points) * np.prod(spread.sizes) * np.prod(spread.scale))
+    if P.as_box is not None:
+        lower, upper = P.as_box.corners
+        return 0.0 if (lower == upper).any() else float(np.prod(upper - lower))
+    summed = _of_simplices(P)
+    if summed is not None:
+        return summed
     if affine_dim(P) < P.dim:
         return 0.0
     if not is_bounded(P):
@@ -41,6 +45,15 @@ def volume(P: Rows) -> float:
         raise UndecidedError("cannot measure the volume: the set is too thin for coordinates in which it is round.")
     size = np.prod(program.columns) * abs(np.linalg.det(body.axes))
     return float(points_volume(listed(body)) * size)
+
+
+def _of_simplices(P: Rows) -> float | None:
+    """The volume as a sum of those of simplices, where vertices and the rows that they lie on are certain."""
+    if P.d.size:
+        return None
+    if maybe_short(P.A, P.b):
+        return short_volume(P.A, P.b)
+    return None if P.prepared is None else summed_volume(P.prepared)
 
 
 def _of_generators(P: ExactGenerators) -> float:

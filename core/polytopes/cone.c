@@ -209,19 +209,19 @@ static int first_ray(Cone *cone, const double *inner, integer *rows, double *ray
     return 1;
 }
 
-/* A point x (d - 1,) that rows a'x <= b, given as (a, -b), meet in: Newton steps with residuals in twice the precision. */
-static void to_point(const Cone *cone, const integer *rows, double *ray)
+/* A point x (d - 1,) that rows a'x <= b, given as (a, -b), meet in: Newton steps with residuals in twice the precision.
+ * at (d, m) rows, inverse (d, d) of those (d - 1,) and the ray, step (d,). */
+void to_point(integer d, integer m, const double *at, const integer *rows, const double *inverse, double *step,
+              double *ray)
 {
-    const integer d = cone->d;
-    double *step = cone->total;
     for (integer j = 0; j < d - 1; j++) ray[j] /= ray[d - 1];
     ray[d - 1] = 1.0;
     for (int turn = 0; turn < STEPS; turn++) {
         fill(step, 0.0, d);
         for (integer k = 0; k < d - 1; k++) {
             Sum value = {0.0, 0.0, 0.0};
-            for (integer j = 0; j < d; j++) add_product(&value, cone->at[j * cone->m + rows[k]], ray[j]);
-            add_multiple(step, value.total + value.lost, cone->inverse + k * d, d);
+            for (integer j = 0; j < d; j++) add_product(&value, at[j * m + rows[k]], ray[j]);
+            add_multiple(step, value.total + value.lost, inverse + k * d, d);
         }
         double moved = 0.0, size = 0.0;
         for (integer j = 0; j < d - 1; j++) {
@@ -276,7 +276,7 @@ EXPORTED integer fdi_cone_rays(integer d, integer m, const double *at, const dou
         }
         const double scale = bounded ? 1.0 / ray[n] : 1.0, *last = cone.column + n * m;
         for (integer i = 0; i < m - (bounded ? 1 : 0); i++) *slack = smaller(*slack, -last[i] * scale);
-        if (bounded) to_point(&cone, rows, ray);
+        if (bounded) to_point(d, m, at, rows, cone.inverse, cone.total, ray);
     }
     return count;
 }

@@ -5,11 +5,8 @@
  * row. Two rays are adjacent if no third one lies on all rows that both lie on (Fukuda and Prodon 1996). Nothing is
  * rounded: before a product could leave 63 bits the method stops, and larger integers have to go on.
  */
+#include "polytopes/integers.h"
 #include "polytopes/polytopes.h"
-
-enum { OVERFLOWS = -1, TOO_MANY_RAYS = -2, NO_ROOM_FOR_RAYS = -3 };
-
-static const double MACHINE = 4.611686018427387904e18; /* 2^62: sums below do not overflow, with room for rounding */
 
 typedef struct {
     integer d, m, words, room, count;
@@ -20,30 +17,6 @@ typedef struct {
     integer *value;      /* (room,) of each ray on the row that is taken */
     integer *beyond, *inside; /* numbers of rays */
 } Description;
-
-static double magnitude(const integer *vector, integer d)
-{
-    double largest = 0.0;
-    for (integer j = 0; j < d; j++) largest = larger(fabs((double)vector[j]), largest);
-    return largest;
-}
-
-static integer bits(uint64_t word)
-{
-    word -= (word >> 1) & 0x5555555555555555u;
-    word = (word & 0x3333333333333333u) + ((word >> 2) & 0x3333333333333333u);
-    word = (word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu;
-    return (integer)((word * 0x0101010101010101u) >> 56);
-}
-
-static integer common_divisor(integer a, integer b)
-{
-    while (b) {
-        const integer rest = a % b;
-        a = b, b = rest;
-    }
-    return a < 0 ? -a : a;
-}
 
 static void mark(Description *cone, integer ray, integer row)
 {

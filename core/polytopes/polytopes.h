@@ -10,8 +10,14 @@
  * clarkson.c     the same over the facets that are known so far
  * elimination.c  Fourier-Motzkin elimination
  * box.c          what needs no program
+ * questions.c    rows as they are given, asked in one call
  * cone.c         extreme rays of cones in general position, proven in floats
+ * near_cone.c    extreme rays of cones that are not in general position, in floats
+ * bounded_sets.c vertices of rows, rows of points and volumes, in floats
+ * volume.c       volume by the vertices and the rows that they lie on
  * double_description.c  extreme rays of any pointed cone, in integers
+ * pointed_cone.c  where that begins: the order of rows, a basis, its rays
+ * exact_sets.c   vertices of rows, and rows of points, in integers from floats to floats
  *
  * Rows arrive scaled by powers of two, with Euclidean norms in [1/2, 2), and transposed, so that loops over rows are
  * contiguous. Sizes: d variables, m rows. An exported function works in a block of the caller's, of as many doubles as
@@ -80,6 +86,51 @@ void put_column(double *c, const Rows *rows, integer i);
 integer irredundant(const Rows *rows, const double *x0, const integer *known, integer *chosen, integer *doubtful,
                     Memory memory);
 integer irredundant_room(integer d, integer m);
+
+/* programs.c */
+integer fdi_interior_room(integer d, integer m);
+integer fdi_interior(integer d, integer m, const double *at, const double *b, const double *norms, const double *x0,
+                     double times, double *found, double *block);
+integer fdi_supports_room(integer d, integer m, integer k);
+void fdi_supports(integer d, integer m, integer k, const double *at, const double *b, const double *x0,
+                  const double *directions, double *found, integer *codes, double *weights, double *block);
+
+/* scaling.c */
+integer fdi_scaled_room(integer m, integer d);
+integer fdi_scaled(integer m, integer d, const double *rows, const double *rhs, double *scaled, integer *codes,
+                   double *block);
+
+/* double_description.c */
+integer fdi_double_description_room(integer d, integer m, integer room);
+integer fdi_double_description(integer d, integer m, const integer *rows, const integer *start, const integer *simplex,
+                               integer most_rays, integer room, integer *rays, double *block);
+
+/* pointed_cone.c */
+integer fdi_pointed_cone_room(integer d, integer m, integer room);
+integer fdi_pointed_cone(integer d, integer m, const integer *rows, integer most_rays, integer room, integer *rays,
+                         double *block);
+const uint64_t *rows_of_rays(integer d, integer m, integer room, double *block);
+
+/* cone.c */
+void to_point(integer d, integer m, const double *at, const integer *rows, const double *inverse, double *step,
+              double *ray);
+integer fdi_cone_rays_room(integer d, integer m, integer most_rays);
+integer fdi_cone_rays(integer d, integer m, const double *at, const double *inner, integer bounded, integer most_rays,
+                      double *rays, integer *active, double *slack, double *block);
+
+/* near_cone.c */
+integer near_cone_room(integer d, integer m, integer room);
+integer near_cone(integer d, integer m, const double *at, int as_points, integer room, double *rays, uint64_t *on,
+                  double *block);
+
+/* volume.c */
+integer volume_room(integer n, integer m, integer k);
+double volume_of(integer n, integer m, integer k, const double *points, const uint64_t *on, integer row_words,
+                 double *block);
+
+/* duality.c */
+void fdi_gaps(integer d, integer k, const double *forms, const double *points, const double *bounds,
+              const double *spare, const double *beside, const double *reach, double *found);
 
 /* clarkson.c */
 void clarkson(const Rows *rows, const integer *asked, integer *keep, integer *doubtful, Memory memory);

@@ -120,7 +120,7 @@ EXPORTED integer fdi_supports_room(integer d, integer m, integer k)
  * at (d, m), b (m,): scaled rows; x0 (d,): a feasible point. Results: found holds points (k, d), multipliers (k, d),
  * beside (k, d), bounds (k,) and spare (k,), one after the other; codes holds active rows (k, d) and statuses (k,).
  * All but the status mean something only where it is OPTIMAL: then c'x <= bounds - spare + beside'|x| for all x of the
- * set (see dual_bound). weights (k, m), zero before: the multipliers again, by their rows.
+ * set (see dual_bound). weights (k, m), zero before, or NULL: the multipliers again, by their rows.
  */
 EXPORTED void fdi_supports(integer d, integer m, integer k, const double *at, const double *b, const double *x0,
                            const double *directions, double *found, integer *codes, double *weights, double *block)
@@ -145,7 +145,7 @@ EXPORTED void fdi_supports(integer d, integer m, integer k, const double *at, co
         if (status[q] == OPTIMAL) bounds[q] = dual_bound(&rows, c, state, beside + q * d, spare + q, chain.work);
         for (integer j = 0; j < d; j++) {
             const integer row = codes[q * d + j] = state->W[j];
-            if (row >= 0) weights[q * m + row] = state->y[j];
+            if (row >= 0 && weights) weights[q * m + row] = state->y[j];
         }
         if (status[q] == LIMIT || status[q] == AMBIGUOUS) begin(&rows, x0, state);
     }

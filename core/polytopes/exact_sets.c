@@ -1,0 +1,130 @@
+/* Vertices of rows and rows of points by the double description in integers, from floats to floats.
+ *
+ * The set {x : A x <= b} is the slice t = 1 of the cone a'y <= b t, t >= 0, and the rows that hold on all points are a
+ * cone too. Only what is exact throughout is answered: rows of few bits, bounded full-dimensional sets, results that are
+ * quotients of floats.
+ */
+#include "polytopes/integers.h"
+#include "polytopes/polytopes.h"
+#include "powers.h"
+
+enum { BITS_OF_FLOATS = 53, BITS_OF_ENTRIES = 32 };
+
+static const double FLOATS = 9007199254740992.0; /* 2^53: integers up to here are floats */
+
+/* Exponent of the last bit of a number that is not zero. */
+static integer last_bit(double value)
+{
+    const integer top = exponent_of(value);
+    const uint64_t whole = (uint64_t)times_power(fabs(value), BITS_OF_FLOATS - top);
+    return top - BITS_OF_FLOATS + bits((whole & (~whole + 1)) - 1);
+}
+
+/* A row of floats [a, b] (d,), b apart, as primitive integers below 2^most; 0 if they are not. */
+static int integer_row(const double *a, double b, integer d, integer most_bits, integer *to)
+{
+    integer low = 10000, high = -10000;
+    for (integer j = 0; j < d; j++) {
+        const double value = j < d - 1 ? a[j] : b;
+        if (value == 0.0) continue;
+        low = least(last_bit(value), low), high = most(exponent_of(value), high);
+    }
+    if (high - low > 62) return 0;
+    for (integer j = 0; j < d; j++) {
+        const double value = j < d - 1 ? a[j] : b;
+        to[j] = value == 0.0 ? 0 : (integer)times_power(value, -low);
+    }
+    make_primitive(to, d);
+    return magnitude(to, d) < times_power(1.0, most_bits);
+}
+
+/* Rows (m, d) of floats as primitive integers below 2^62; 0 if one is not. */
+EXPORTED integer fdi_integer_rows(integer m, integer d, const double *table, integer *rows)
+{
+    for (integer i = 0; i < m; i++)
+        if (!integer_row(table + i * d, table[i * d + d - 1], d, 62, rows + i * d)) return 0;
+    return 1;
+}
+
+EXPORTED integer fdi_exact_set_room(integer n, integer m, integer room)
+{
+    return (n + 1) * (m + 1) + (n + 1) * room + fdi_pointed_cone_room(n + 1, m + 1, room);
+}
+
+EXPORTED integer fdi_exact_vertices_room(integer n, integer m, integer room)
+{
+    return fdi_exact_set_room(n, m, room) + volume_room(n, m + 1, room);
+}
+
+typedef struct {
+    integer *rows, *rays; /* (m + 1, n + 1), (room, n + 1) */
+    double *rest;
+} Work;
+
+static Work lay_out(double *block, integer n, integer m, integer room)
+{
+    Memory memory = {block, 0};
+    Work work = {integers(&memory, (n + 1) * (m + 1)), integers(&memory, (n + 1) * room), NULL};
+    work.rest = block + memory.used;
+    return work;
+}
+
+/* Vertices (room, n) of a bounded set A x <= b, rows (m, n) and (m,), to the nearest floats: their number, or why not.
+ *
+ * said (2,): whether they are floats, so that nothing was rounded; and, unless it is zero before, the volume of their
+ * hull, -1 if it has too many simplices.
+ */
+EXPORTED integer fdi_exact_vertices(integer n, integer m, const double *A, const double *b, integer most_rays,
+                                    integer room, double *points, double *said, double *block)
+{
+    const integer d = n + 1;
+    const Work work = lay_out(block, n, m, room);
+    for (integer i = 0; i < m; i++) {
+        integer *row = work.rows + i * d;
+        if (!integer_row(A + i * n, b[i], d, BITS_OF_ENTRIES, row)) return OVERFLOWS;
+        row[n] = -row[n];
+    }
+    for (integer j = 0; j < d; j++) work.rows[m * d + j] = j == n ? -1 : 0;
+    const integer count = fdi_pointed_cone(d, m + 1, work.rows, most_rays, room, work.rays, work.rest);
+    said[0] = 1.0;
+    for (integer r = 0; r < count; r++) {
+        const integer *ray = work.rays + r * d;
+        if (ray[n] & (ray[n] - 1)) said[0] = 0.0; /* primitive: quotients are floats if that is a power of two */
+        if (ray[n] <= 0 || magnitude(ray, d) > FLOATS) return OVERFLOWS; /* empty or unbounded, or not this exact */
+        for (integer j = 0; j < n; j++) points[r * n + j] = (double)ray[j] / (double)ray[n];
+    }
+    if (count > 0 && said[1] != 0.0) {
+        const uint64_t *on = rows_of_rays(d, m + 1, room, work.rest);
+        said[1] = volume_of(n, m + 1, count, points, on, (m + 64) / 64, block + fdi_exact_set_room(n, m, room));
+    }
+    return count == 0 ? OVERFLOWS : count;
+}
+
+/* Rows [A, b] (room, n + 1) of the hull of points (k, n) that span the space, exact: their number, or why not. */
+EXPORTED integer fdi_exact_hull(integer n, integer k, const double *points, integer most_rays, integer room, double *rows,
+                                double *block)
+{
+    const integer d = n + 1;
+    const Work work = lay_out(block, n, k, room);
+    for (integer i = 0; i < k; i++) {
+        integer *row = work.rows + i * d; /* (-t, x) with x in reverse: rows that are alike but for b are so in order */
+        if (!integer_row(points + i * n, 1.0, d, BITS_OF_ENTRIES, row)) return OVERFLOWS;
+        for (integer p = 0, q = d - 1; p < q; p++, q--) {
+            const integer kept = row[p];
+            row[p] = row[q], row[q] = kept;
+        }
+        row[0] = -row[0];
+    }
+    const integer found = fdi_pointed_cone(d, k, work.rows, most_rays, room, work.rays, work.rest);
+    integer count = 0;
+    for (integer r = 0; r < found; r++) {
+        const integer *ray = work.rays + r * d;
+        const double largest = magnitude(ray + 1, n);
+        if (largest == 0.0) continue; /* 0 <= 1 */
+        if (magnitude(ray, d) > FLOATS) return OVERFLOWS;
+        const integer size = exponent_of(largest), power = size > BITS_OF_ENTRIES ? -size : 0;
+        for (integer j = 0; j < d; j++) rows[count * d + j] = times_power((double)ray[d - 1 - j], power);
+        count++;
+    }
+    return found < 0 ? found : count;
+}

@@ -1,0 +1,185 @@
+/* Rows as a user gives them, asked in one call: put into even units, a largest ball, upper bounds of supports.
+ *
+ * Only what floats settle at once is answered: rows without zeros whose largest ball is not small, and forms whose
+ * multipliers prove a bound near the value at the point that was found. All else is left to whoever asks.
+ */
+#include "polytopes/polytopes.h"
+#include "polytopes/prepared.h"
+#include "powers.h"
+#include "vectors.h"
+
+EXPORTED integer fdi_prepared_size(integer d, integer m)
+{
+    Prepared set;
+    return lay_out_prepared(&set, NULL, d, m);
+}
+
+EXPORTED integer fdi_prepared_room(integer d, integer m)
+{
+    return d + 1 + m + d + most(fdi_scaled_room(m, d), fdi_interior_room(d, m));
+}
+
+/* Prepares rows (m, d), rhs (m,); 0 if one is zero or out of reach, or if the largest ball is not clear: found, and of a
+ * radius above so much of the size of b. times: as fdi_interior.
+ */
+EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const double *rhs, double times, double least_ball,
+                              double *prepared, double *block)
+{
+    Prepared set;
+    lay_out_prepared(&set, prepared, d, m);
+    double *found = block, *origin = found + d + 1 + m, *scratch = origin + d;
+    if (fdi_scaled(m, d, rows, rhs, set.at, set.s, scratch) < m) return 0;
+    if (set.rest[m] >= 0 || set.rest[m + 1] >= 0) return 0;
+    fill(origin, 0.0, d);
+    const integer status = fdi_interior(d, m, set.at, set.b, set.norms, origin, times, found, scratch);
+    const Rows all = {d, m, m, set.at, set.b};
+    *set.radius = found[d], *set.size = scale_of(&all), set.reach[0] = NAN;
+    copy(set.centre, found, d);
+    copy(set.multipliers, found + d + 1, m);
+    return status == OPTIMAL && found[d] > least_ball * *set.size;
+}
+
+EXPORTED integer fdi_prepared_ball_room(integer d, integer m) { return d + 1 + 2 * m + fdi_interior_room(d, m); }
+
+/* Centre (d,) and radius of a largest ball of a prepared set in the units of its rows (m, d), one after the other.
+ *
+ * 0 if no finite one was found whose radius is within `clean` of what its multipliers prove, up to rounding.
+ */
+EXPORTED integer fdi_prepared_ball(integer d, integer m, const double *rows, double *prepared, double times, double clean,
+                                   double *ball, double *block)
+{
+    Prepared set;
+    lay_out_prepared(&set, prepared, d, m);
+    double *found = block, *norms = found + d + 1 + m, *scratch = norms + m, proved = 0.0;
+    integer top = -10000;
+    for (integer i = 0; i < m; i++) {
+        norms[i] = sqrt(sum_of_squares(rows + i * d, d));
+        if (!(norms[i] > 1e-150 && norms[i] < 1e150)) return 0;
+        top = most(top, exponent_of(norms[i]) + set.r[i]);
+    }
+    for (integer i = 0; i < m; i++) norms[i] = times_power(norms[i], set.r[i] - top); /* radii are 2^-top as large */
+    if (fdi_interior(d, m, set.at, set.b, norms, set.centre, times, found, scratch) != OPTIMAL) return 0;
+    double radius = INFINITY;
+    for (integer i = 0; i < m; i++) {
+        double slack = set.b[i];
+        for (integer j = 0; j < d; j++) slack -= set.at[j * m + i] * found[j];
+        radius = smaller(slack / norms[i], radius);
+        proved += found[d + 1 + i] * set.b[i];
+    }
+    if (!(found[d] < INFINITY && radius > 0.0 && fabs(proved - radius) <= clean * radius)) return 0;
+    for (integer j = 0; j < d; j++) ball[j] = times_power(found[j], set.s[j]);
+    ball[d] = times_power(radius, -top);
+    return 1;
+}
+
+typedef struct {
+    double *forms, *found, *gaps;
+    integer *tops, *codes;
+    double *scratch;
+} Question;
+
+static integer lay_out_question(Question *question, double *block, integer d, integer m, integer k)
+{
+    Memory memory = {block, 0};
+    question->forms = doubles(&memory, k * d), question->found = doubles(&memory, (3 * d + 2) * k);
+    question->gaps = doubles(&memory, 3 * k);
+    question->tops = integers(&memory, k), question->codes = integers(&memory, (d + 1) * k);
+    question->scratch = doubles(&memory, fdi_supports_room(d, m, k));
+    return memory.used;
+}
+
+EXPORTED integer fdi_prepared_supports_room(integer d, integer m, integer k)
+{
+    Question own, axes;
+    return lay_out_question(&own, NULL, d, m, k) + lay_out_question(&axes, NULL, d, m, 2 * d);
+}
+
+static void solve(const Prepared *set, integer d, integer m, integer k, const Question *question, double *weights)
+{
+    fdi_supports(d, m, k, set->at, set->b, set->centre, question->forms, question->found, question->codes, weights,
+                 question->scratch);
+}
+
+/* Bounds (d,) of |x| over the set from those along the axes (see `proved_reach` in Python); 0 if there are none. */
+static int find_reach(Prepared *set, integer d, integer m, double *block)
+{
+    Question axes;
+    lay_out_question(&axes, block, d, m, 2 * d);
+    fill(axes.forms, 0.0, 2 * d * d);
+    for (integer j = 0; j < d; j++) axes.forms[j * d + j] = 0.5, axes.forms[(d + j) * d + j] = -0.5;
+    solve(set, d, m, 2 * d, &axes, NULL);
+    const double *beside = axes.found + 4 * d * d, *bounds = beside + 2 * d * d;
+    double farthest = 0.0, steepest = 0.0;
+    for (integer q = 0; q < 2 * d; q++)
+        if (axes.codes[2 * d * d + q] != OPTIMAL) return 0;
+    for (integer j = 0; j < d; j++) {
+        double slope = 0.0;
+        for (integer i = 0; i < d; i++) slope += 2.0 * larger(beside[j * d + i], beside[(d + j) * d + i]);
+        const double value = larger(larger(2.0 * bounds[j], 2.0 * bounds[d + j]), 0.0);
+        farthest = larger(farthest, value), steepest = larger(steepest, slope);
+        axes.gaps[j] = slope, set->reach[j] = value;
+    }
+    if (!(steepest < 0.25 && farthest < INFINITY)) return 0; /* then max |x| <= max v / (1 - 1/4) */
+    for (integer j = 0; j < d; j++)
+        set->reach[j] = (set->reach[j] + axes.gaps[j] * 2.0 * farthest) * (1.0 + 8.0 * EPS);
+    return 1;
+}
+
+/* Forms (k, d) in the units of the set, their largest entries about one. */
+static void scale_forms(const Prepared *set, integer d, integer k, const double *directions, const Question *question)
+{
+    for (integer q = 0; q < k; q++) {
+        double *form = question->forms + q * d;
+        for (integer j = 0; j < d; j++) form[j] = times_power(directions[q * d + j], set->s[j]);
+        question->tops[q] = exponent_of(largest_magnitude(form, d));
+        for (integer j = 0; j < d; j++) form[j] = times_power(form[j], -question->tops[q]);
+    }
+}
+
+static int bounds_of(Prepared *set, integer d, integer m, integer k, const Question *question, double *spare_block)
+{
+    const double *beside = question->found + 2 * k * d, *bounds = beside + k * d;
+    int rounded = 0;
+    for (integer q = 0; q < k * d; q++) rounded |= beside[q] > 0.0;
+    if (rounded && isnan(set->reach[0]) && !find_reach(set, d, m, spare_block)) {
+        set->reach[0] = NAN;
+        return 0;
+    }
+    fdi_gaps(d, k, question->forms, question->found, bounds, bounds + k, beside, set->reach, question->gaps);
+    return 1;
+}
+
+/* Upper bounds (k,) of the supports of a prepared set along directions (k, d), infinite where it is unbounded.
+ *
+ * 0 if a bound is neither within `clean` of the sizes of its terms nor within `sharp` of the radius (and rounding) of the
+ * value that was found, or a form was not solved. Points (k, d) and multipliers of the rows (k, m), zero before, are left
+ * if there is room for them (else NULL). They mean something only where values are finite.
+ */
+EXPORTED integer fdi_prepared_supports(integer d, integer m, integer k, double *prepared, const double *directions,
+                                       double clean, double sharp, double *values, double *points, double *weights,
+                                       double *block)
+{
+    Prepared set;
+    Question question;
+    lay_out_prepared(&set, prepared, d, m);
+    const integer used = lay_out_question(&question, block, d, m, k);
+    scale_forms(&set, d, k, directions, &question);
+    solve(&set, d, m, k, &question, weights);
+    if (!bounds_of(&set, d, m, k, &question, block + used)) return 0;
+    const integer *status = question.codes + k * d;
+    for (integer q = 0; q < k; q++) {
+        const double gap = question.gaps[k + q], terms = question.gaps[2 * k + q];
+        values[q] = INFINITY;
+        if (status[q] == UNBOUNDED) continue;
+        const double room = smaller(clean * terms, sharp * larger(*set.radius, 0.0) + 8.0 * EPS * terms);
+        if (status[q] != OPTIMAL || !(gap <= room)) return 0;
+        values[q] = times_power(question.gaps[q], question.tops[q]);
+        if (!(fabs(values[q]) < INFINITY)) return 0;
+        if (points)
+            for (integer j = 0; j < d; j++) points[q * d + j] = times_power(question.found[q * d + j], set.s[j]);
+        if (weights)
+            for (integer i = 0; i < m; i++)
+                weights[q * m + i] = times_power(weights[q * m + i], set.r[i] + question.tops[q]);
+    }
+    return 1;
+}

@@ -1,0 +1,115 @@
+"""Rows as they are given, prepared for questions by one call of the core, where floats settle them at once.
+
+That is the case of most sets: rows of which none is zero, with a largest ball that is not small.  All others, and forms
+whose bound is not near the value that was found, go through `Program`.  See `core/polytopes/questions.c`.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from polytopes.affine import AffineSet, affine_set
+from polytopes.checks import Floats
+from polytopes.exact_units import EvenRows
+from polytopes.linear_program import (
+    CLEAN,
+    OPTIMAL,
+    SHARP,
+    SMALL_BALL,
+    UNBOUNDED,
+    WIDEST,
+    Interior,
+    Maxima,
+    Program,
+    small,
+)
+from polytopes.native import Address, Entries, Given, Integer, Real, address, function, scratch
+from polytopes.rounding import check_rounding
+
+_prepare = function("fdi_prepared", *[Integer] * 2, *[Given] * 2, *[Real] * 2, Entries, Address, returns=Integer)
+_ball = function("fdi_prepared_ball", *[Integer] * 2, Given, Entries, *[Real] * 2, Entries, Address, returns=Integer)
+_supports = function(
+    "fdi_prepared_supports", *[Integer] * 3, Entries, Given, *[Real] * 2, Entries, *[Address] * 3, returns=Integer
+)
+_size, _room, _ball_room = (
+    lru_cache(1024)(function(f"fdi_prepared{name}", *[Integer] * 2, returns=Integer))
+    for name in ("_size", "_room", "_ball_room")
+)
+_supports_room = lru_cache(1024)(function("fdi_prepared_supports_room", *[Integer] * 3, returns=Integer))
+
+
+class PreparedRows(NamedTuple):
+    """Rows ``A x <= b``, and the block of the core that they are prepared in."""
+
+    A: Floats
+    b: Floats
+    block: Floats
+
+    @classmethod
+    def of(cls, A: Floats, b: Floats) -> Self | None:
+        """The rows A (m, n), b (m,) prepared; None where floats do not settle at once that a ball fits in."""
+        check_rounding()
+        m, n = A.shape
+        if not m or not small(n, m):
+            return None
+        block = np.empty(_size(n, m))
+        return cls(A, b, block) if _prepare(n, m, A, b, WIDEST, SMALL_BALL, block, scratch(_room(n, m))) else None
+
+    def supports(self, directions: Floats) -> Floats | None:
+        """Upper bounds (k,) of the supports along directions (k, n), inf where unbounded; None if one is open."""
+        values = np.empty(len(directions))
+        return values if self._settled(directions, values, None, None) else None
+
+    def maxima(self, directions: Floats) -> Maxima | None:
+        """The same with points and multipliers."""
+        k = len(directions)
+        values, points, weights = np.empty(k), np.empty(directions.shape), np.zeros((k, self.b.size))
+        if not self._settled(directions, values, address(points), address(weights)):
+            return None
+        return Maxima(values, points, weights, [UNBOUNDED if value == np.inf else OPTIMAL for value in values.tolist()])
+
+    def _settled(self, directions: Floats, values: Floats, points: int | None, weights: int | None) -> int:
+        check_rounding()
+        (k, n), m = directions.shape, self.b.size
+        room = scratch(_supports_room(n, m, k))
+        settled: int = _supports(n, m, k, self.block, directions, CLEAN, SHARP, values, points, weights, room)
+        return settled
+
+    def ball(self) -> tuple[Floats, float] | None:
+        """Centre (n,) and radius of a largest ball; None if it is not settled."""
+        m, n = self.A.shape
+        found = np.empty(n + 1)
+        settled = _ball(n, m, self.A, self.block, WIDEST, CLEAN, found, scratch(_ball_room(n, m)))
+        return (found[:n], found.item(n)) if settled else None
+
+    def program(self) -> Program:
+        """The rows as a program, its largest ball known."""
+        m, n = self.A.shape
+        _, AT, rhs, norms, centre, weights, _, columns, rows = self._parts()
+        radius, powers, row_powers = self.block.item(0), columns.view(np.int64), rows.view(np.int64)
+        flat, AT, every = _everywhere(n), AT.reshape(n, m), np.arange(m)
+        exact = EvenRows(self.A, self.b, flat, row_powers, powers)
+        program = Program(self.A, self.b, flat, exact, AT, rhs, norms, row_powers, powers, every, None)
+        program.__dict__["interior"] = Interior(program.lift(centre[:n]), centre[:n], radius, weights, True)
+        return program
+
+    def _parts(self) -> list[Floats]:
+        """Head, AT, rhs, norms, centre, multipliers, reach, exponents of columns and of rows, as the core has them."""
+        m, n = self.A.shape
+        sizes = (2, n * m, m, m, n + 1, m, n, n, m)
+        return np.split(self.block, np.cumsum(sizes))[:-1]
+
+
+@lru_cache(64)
+def _everywhere(n: int) -> AffineSet:
+    """R^n, the affine set of no equalities."""
+    return affine_set(np.empty((0, n)), np.empty(0))
+
+
+@lru_cache(256)
+def both_ways(n: int) -> Floats:
+    """The axes of R^n and their opposites (2 n, n)."""
+    axes = np.vstack([np.eye(n), -np.eye(n)])
+    axes.setflags(write=False)
+    return axes
