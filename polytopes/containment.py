@@ -51,7 +51,7 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
         return Containment(True)
     normals, sides = evened(*half_spaces(P))
     sizes = lengths(normals)
-    beyond = Q.program.estimate(normals) - sides
+    beyond = _supports(Q, normals) - sides
     broken = ~(beyond <= tol * sizes)
     if not broken.any():
         return Containment(True)
@@ -60,6 +60,12 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
     i = int(np.argmax(excess))
     row = i if i < P.b.size + P.d.size else i - P.d.size
     return Containment(False, _beyond(Q, normals[i], float(sides[i]), tol), row, float(excess[i]))
+
+
+def _supports(Q: Rows, normals: Floats) -> Floats:
+    """Supports of a nonempty set as floats see them: along what is no ray but for rounding they are finite."""
+    values = None if Q.prepared is None else Q.prepared.supports(normals)
+    return values if values is not None and (values < np.inf).all() else Q.program.estimate(normals)
 
 
 def _beyond(Q: Rows, normal: Floats, side: float, tol: float) -> Floats | None:

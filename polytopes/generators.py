@@ -119,15 +119,17 @@ def rows_of_generators(V: Floats, rays: Floats) -> Table:
     In integers where the numbers are short, where there are rays, and where the points are flat; the rows are exact if
     they are floats, and outward else.
     """
+    known = None if len(rays) else exact_hull(V)
+    if known is not None:
+        return known
     unit = _unit(V)
     if unit:
         A, b, C, d = rows_of_generators(np.ldexp(V, -unit), rays)
         return A, np.ldexp(b, unit), C, np.ldexp(d, unit)
-    if not len(rays):
-        known = short_hull(V) if short_vector([*V[0].tolist(), 1.0]) else rows_around(V)
-        if known is not None:
-            return known[:, :-1], known[:, -1], np.empty((0, V.shape[1])), np.empty(0)
     points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
+    around = None if len(rays) or short(points) else rows_around(V)
+    if around is not None:
+        return around[:, :-1], around[:, -1], np.empty((0, V.shape[1])), np.empty(0)
     directions = integer_rows(rays[rays.any(axis=1)])
     exact = short(points) or len(directions) > 0
     spread = None if exact else Spread.of(V)
@@ -145,7 +147,7 @@ def rows_of_generators(V: Floats, rays: Floats) -> Table:
 def _unit(V: Floats) -> int:
     """The exponent of a power of two of which points V are short multiples; 0 where they are short as they are."""
     some = V[V != 0.0]
-    if not some.size:
+    if not some.size or not short_vector([some.item(0)]):
         return 0
     lowest, highest = int(lowest_bit(some).min()), int(np.frexp(some)[1].max())
     near = lowest >= -_SHORT_BITS and highest <= _SHORT_BITS

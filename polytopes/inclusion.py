@@ -43,6 +43,8 @@ def has_exact_point(P: Rows, x: Sequence[Fraction]) -> bool:
 
 def half_spaces(P: Rows) -> tuple[Floats, Floats]:
     """Normals and right-hand sides of all rows, an equality as two: those of A, those of C, those of -C."""
+    if not P.d.size:
+        return P.A, P.b
     return np.vstack([P.A, P.C, -P.C]), np.concatenate([P.b, P.d, -P.d])
 
 

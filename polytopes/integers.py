@@ -83,6 +83,13 @@ def exact_product(A: Floats, M: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     return A @ M, np.abs(A) @ np.abs(M) <= limit
 
 
+def rounded_difference(first: Floats, second: Floats, difference: Floats) -> Floats:
+    """What was rounded in ``first - second`` (Knuth's sum of two floats)."""
+    part = difference - first
+    lost: Floats = (first - (difference - part)) - (second + part)
+    return lost
+
+
 def are_floats(row: Sequence[int]) -> bool:
     """Whether each integer is a float, up to one power of two for all of them."""
     return all(v == 0 or abs(v).bit_length() - _trailing(v) <= 53 for v in row) and _span(row) < _FARTHEST

@@ -247,13 +247,13 @@ def cone_rays(GT: Floats, inner: Floats, bounded: bool, most_rays: int) -> tuple
         Arrays (k, d), with ``y_(d-1) = 1`` if bounded, and (k, d - 1): the rows that each lies on; and the least slack
         of a row at a ray that does not lie on it.
     """
-    (d, m), room, slack = GT.shape, min(_RAYS, most_rays), np.empty(1)
+    (d, m), room, slack = GT.shape, min(_RAYS, most_rays), np.empty(2)
     while True:
         rays, active = np.empty((room, d)), np.empty((room, d - 1), np.int64)
         block = scratch(_cone_rays_room(d, m, room))
         k = _cone_rays(d, m, GT, inner, bounded, room, rays, active, slack, block)
         if k >= 0:
-            return rays[:k], active[:k], slack.item()
+            return rays[:k], active[:k], slack.item(0)
         if k == _UNPROVEN or room >= most_rays:
             return None
         room = min(4 * room, most_rays)

@@ -26,7 +26,7 @@ from polytopes.rounding import check_rounding
 
 Indices = NDArray[np.int64]
 
-_KERNEL_VARIABLES = 40
+_KERNEL_VARIABLES = 200
 _KERNEL_ENTRIES = 200_000
 _EPS = float(np.finfo(np.float64).eps)
 WIDEST = 4.0  # of the size of b: by duality no radius is beyond max |b_i| / |a_i|, and no norm is below 1/2

@@ -4,8 +4,10 @@ import numpy as np
 
 from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError
+from polytopes.general_position import rows_around
 from polytopes.generators import exact_hull, in_integers
 from polytopes.hull import normals_around
+from polytopes.integers import rounded_difference
 from polytopes.minkowski_weyl import total
 from polytopes.outer_supports import upper_supports
 from polytopes.outward import float_rows
@@ -13,9 +15,10 @@ from polytopes.projection import project
 from polytopes.rows import Rows, Table, nothing
 from polytopes.short_sets import Corners
 from polytopes.support import is_bounded, known_nonempty
-from polytopes.vertices import vertices
+from polytopes.vertices import quick_vertices, vertices
 
 _MAX_SUMS = 4_000  # sums of vertices up to which integers are affordable
+_FEW_SUMS = 300
 _CHEAP_ROWS = 1000
 
 
@@ -53,14 +56,18 @@ def _of_exact_corners(V: Corners | None, W: Corners | None) -> Table | None:
         return None
     first, second = V.points[:, None], W.points
     sums = first + second
-    part = sums - first
-    rounded = (first - (sums - part)) + (second - part)
-    return None if rounded.any() else exact_hull(sums.reshape(-1, sums.shape[2]))
+    if rounded_difference(first, -second, sums).any():
+        return None
+    return exact_hull(sums.reshape(-1, sums.shape[2]))
 
 
 def _normals(P: Rows, Q: Rows) -> Floats:
     """Normals of the facets of a bounded sum, and of a subspace that it nearly lies in."""
     n = P.dim
+    few = _few_sums(quick_vertices(P), quick_vertices(Q))
+    facets = None if few is None else rows_around(few)
+    if facets is not None:
+        return facets[:, :-1]
     try:
         if P.wide and Q.wide:
             return _normals_by_elimination(P, Q)
@@ -68,6 +75,13 @@ def _normals(P: Rows, Q: Rows) -> Floats:
         pass
     sums = vertices(P)[:, None, :] + vertices(Q)
     return normals_around(sums.reshape(-1, n))
+
+
+def _few_sums(V: Floats | None, W: Floats | None) -> Floats | None:
+    """All sums of known vertices, if they are so few that their hull is quicker than elimination."""
+    if V is None or W is None or len(V) * len(W) > _FEW_SUMS:
+        return None
+    return (V[:, None] + W).reshape(-1, V.shape[1])
 
 
 def _normals_by_elimination(P: Rows, Q: Rows) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.exact_sides import with_sides
-from polytopes.integers import is_short
+from polytopes.integers import exact_product, is_short, rounded_difference
 from polytopes.linear_program import Program
 from polytopes.outer_supports import exact_supports, lower_supports
 from polytopes.rows import Rows, Table, everything, nothing
@@ -29,6 +29,9 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     UndecidedError
         If Q is flat or thin, or the result nearly flat, and Q too large for rational arithmetic.
     """
+    known = _by_exact_corners(P, Q)
+    if known is not None:
+        return known
     result = maxima(Q, np.vstack([P.A, P.C, -P.C]))
     if result is None:
         return everything(P.dim)
@@ -47,6 +50,18 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     if near is None:
         raise UndecidedError("Q is flat or thin, and too large for its supports along the rows of P in rationals.")
     return near
+
+
+def _by_exact_corners(P: Rows, Q: Rows) -> Table | None:
+    """The rows moved inward, where the vertices of Q, its supports and what is left are floats; None if not."""
+    if P.d.size or Q.corners is None or not Q.corners.exact:
+        return None
+    values, certain = exact_product(P.A, Q.corners.points.T)
+    if not certain.all():
+        return None
+    supports = values.max(axis=1)
+    sides = P.b - supports
+    return None if rounded_difference(P.b, supports, sides).any() else (P.A, sides, P.C, P.d)
 
 
 def _clear(program: Program, b: Floats) -> bool:

@@ -56,6 +56,12 @@ class PreparedRows(NamedTuple):
         block = np.empty(_size(n, m))
         return cls(A, b, block) if _prepare(n, m, A, b, WIDEST, SMALL_BALL, block, scratch(_room(n, m))) else None
 
+    @property
+    def centre(self) -> Floats:
+        """The centre (n,) of the largest ball in even units; it satisfies every row by more than is rounded."""
+        parts = self._parts()
+        return np.ldexp(parts[4][:-1], parts[7].view(np.int64))
+
     def supports(self, directions: Floats) -> Floats | None:
         """Upper bounds (k,) of the supports along directions (k, n), inf where unbounded; None if one is open."""
         values = np.empty(len(directions))

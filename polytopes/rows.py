@@ -110,6 +110,8 @@ class Rows(Value):
         """Emptiness of the rows, decided once."""
         if self.as_box is not None:
             return Emptiness("nonempty", self.as_box.point, None, "a point between the bounds of a box")
+        if self.prepared is not None:
+            return Emptiness("nonempty", self.prepared.centre, None, "a point with slack beyond rounding")
         return decide_emptiness(self, self.program)
 
     @derived

@@ -31,12 +31,11 @@ def vertices(P: Rows) -> Floats:
     UnboundedError
         If P is unbounded.
     """
-    if P.corners is not None:
-        return P.corners.points.copy()
+    known = quick_vertices(P)
+    if known is not None:
+        return known.copy()
     if not known_nonempty(P):
         return np.empty((0, P.dim))
-    if P.listed is not None:
-        return P.listed.copy()
     if not is_bounded(P):
         raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
     if P.exact is not None:
@@ -51,6 +50,11 @@ def vertices(P: Rows) -> Floats:
     rows, rhs = np.ascontiguousarray(program.AT[:, chosen].T), program.rhs[chosen]
     z = _interval_ends(rows, rhs) if len(free) == 1 else _vertices_in_frame(rows, rhs, program.centre)
     return program.lift(z)
+
+
+def quick_vertices(P: Rows) -> Floats | None:
+    """The vertices (k, n) in lexicographic order, where one call of the core finds them; read-only."""
+    return P.listed if P.corners is None else P.corners.points
 
 
 def _interval_ends(rows: Floats, rhs: Floats) -> Floats:

@@ -12,6 +12,7 @@
 enum { UNKNOWN = -1, MOST_NEAR = 2000 }; /* rays of a cone that is not in general position */
 
 static const double NARROW = 1e-10; /* of an axis: a width beside the size of the points below which it may be rounding */
+static const double STEEP = 1e4;    /* how far a facet of a hull may move with its points: it is right to so many roundings */
 static const integer UNEVEN = 300;  /* exponents of the widths of two axes differ by less */
 
 typedef struct {
@@ -41,11 +42,11 @@ static integer lay_out(Cone *cone, double *block, integer d, integer m, integer 
 static integer solve(Cone *cone, int bounded, double apart)
 {
     const integer d = cone->d, m = cone->m;
-    double slack = 0.0;
+    double slack[2] = {0.0, 0.0};
     const integer count =
-        fdi_cone_rays(d, m, cone->at, cone->inner, bounded, cone->room, cone->rays, cone->active, &slack, cone->rest);
+        fdi_cone_rays(d, m, cone->at, cone->inner, bounded, cone->room, cone->rays, cone->active, slack, cone->rest);
     if (count == TOO_MANY_RAYS) return NO_ROOM_FOR_RAYS;
-    if (count >= 0 && slack > apart) {
+    if (count >= 0 && slack[0] > apart && (bounded || slack[1] < STEEP)) {
         for (integer q = 0; q < count * cone->words; q++) cone->on[q] = 0;
         for (integer r = 0; r < count; r++)
             for (integer q = 0; q < d - 1; q++) {
@@ -55,7 +56,8 @@ static integer solve(Cone *cone, int bounded, double apart)
         return count;
     }
     if (cone->room > MOST_NEAR) return UNKNOWN;
-    return near_cone(d, m, cone->at, bounded, cone->room, cone->rays, cone->on, cone->rest);
+    if (bounded) return near_points(d, m, cone->at, cone->inner, cone->room, cone->rays, cone->on, cone->rest);
+    return near_cone(d, m, cone->at, cone->room, cone->rays, cone->on, cone->rest);
 }
 
 EXPORTED integer fdi_prepared_vertices_room(integer d, integer m, integer room)

@@ -28,6 +28,7 @@ typedef struct {
     double *inverse;    /* (d, d) column k is what row k of the ray leaves by; the last is the ray */
     double *work;       /* (d, 2 d) */
     double *total;      /* (d,) */
+    double steepest;    /* largest length of a column of an inverse: how much a ray moves with its rows */
     integer *fresh;     /* (d - 1,) rows of a neighbour */
     integer *place;     /* (size of the table,) number of a ray, or -1 */
     integer places;
@@ -110,6 +111,7 @@ static int proven(Cone *cone, const integer *rows, const double *ray)
         }
         largest = larger(largest, rounded);
     }
+    cone->steepest = larger(cone->steepest, largest / ((double)(d + 4) * EPS));
     for (integer l = 0; l < d; l++) off = larger(off, cone->total[l]);
     if (!(off < 0.5)) return 0;
     const double z = 2.5 * missed; /* 1 / (1 - |F|) is at most 2, up to what is rounded in it */
@@ -237,7 +239,8 @@ void to_point(integer d, integer m, const double *at, const integer *rows, const
  *
  * at (d, m): rows of length about one, transposed; inner (d,): a point where all of them are negative; bounded: the last
  * row is -y_(d-1) <= 0, no ray may lie on it, and rays come as points with y_(d-1) = 1. rays (most_rays, d), active
- * (most_rays, d - 1): numbers of rows in order; slack: the least distance, in rows, of a ray from a row that it is not on.
+ * (most_rays, d - 1): numbers of rows in order; slack (2,): the least distance, in rows, of a ray from a row that it is not on, and
+ * how far a ray moves at most with its rows.
  */
 EXPORTED integer fdi_cone_rays(integer d, integer m, const double *at, const double *inner, integer bounded,
                                integer most_rays, double *rays, integer *active, double *slack, double *block)
@@ -254,7 +257,7 @@ EXPORTED integer fdi_cone_rays(integer d, integer m, const double *at, const dou
     for (integer i = 0; i < m; i++) cone.length[i] = sqrt(cone.length[i]) * (1.0 + (double)(d + 4) * EPS);
     if (most_rays < 1 || m < d || !first_ray(&cone, inner, active, rays)) return UNPROVEN;
     *found(&cone, active, active) = 0;
-    *slack = HUGE_VAL;
+    slack[0] = HUGE_VAL, cone.steepest = 0.0;
     integer count = 1;
     for (integer r = 0; r < count; r++) {
         const integer *rows = active + r * n;
@@ -275,7 +278,8 @@ EXPORTED integer fdi_cone_rays(integer d, integer m, const double *at, const dou
             *place = count++;
         }
         const double scale = bounded ? 1.0 / ray[n] : 1.0, *last = cone.column + n * m;
-        for (integer i = 0; i < m - (bounded ? 1 : 0); i++) *slack = smaller(*slack, -last[i] * scale);
+        for (integer i = 0; i < m - (bounded ? 1 : 0); i++) slack[0] = smaller(slack[0], -last[i] * scale);
+        slack[1] = cone.steepest;
         if (bounded) to_point(d, m, at, rows, cone.inverse, cone.total, ray);
     }
     return count;

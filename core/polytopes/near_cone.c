@@ -12,9 +12,11 @@
 
 enum { UNCERTAIN = -1 };
 
-static const double ON = 1e-11, BESIDE = 1e-9; /* of rows and rays of length one */
-static const double SURE = 0.25;               /* of ON: the bound of a ray that is known well enough */
-static const double INDEPENDENT = 1e-7;        /* a row beside others: what is left of it across them */
+static const double ON = 1e-11;         /* a ray's value on a row that it lies on, both of length about one */
+static const double BESIDE = 1e-9;      /* and on one that it does not lie on */
+static const double SURE = 0.25;        /* of ON: the bound of a ray that is known well enough */
+static const double INDEPENDENT = 1e-7; /* a row beside others: what is left of it across them */
+static const double SINGULAR = 1e-13;   /* pivot of rows that are dependent */
 
 typedef struct {
     integer d, m, words, room, count;
@@ -43,7 +45,7 @@ static integer lay_out(Cone *cone, double *block, integer d, integer m, integer 
 integer near_cone_room(integer d, integer m, integer room)
 {
     Cone cone;
-    return lay_out(&cone, NULL, d, m, room);
+    return lay_out(&cone, NULL, d, m, room) + d;
 }
 
 static int lies_on(const uint64_t *on, integer row) { return on[row / 64] >> (row % 64) & 1; }
@@ -93,7 +95,7 @@ static int solved(Cone *cone, double *ray)
             const double *row = k < d - 1 ? cone->rows + cone->basis[k] * d : ray;
             copy(cone->work + k * 2 * d, row, d);
         }
-        if (!turn && !invert(cone->work, d, 1e-13, cone->inverse)) return 0;
+        if (!turn && !invert(cone->work, d, SINGULAR, cone->inverse)) return 0;
         for (integer k = 0; k < d - 1 && !turn; k++) {
             const double missed = dot(cone->rows + cone->basis[k] * d, ray, d);
             add_multiple(ray, -missed, cone->inverse + k * d, d);
@@ -123,7 +125,7 @@ static int begin_cone(Cone *cone)
     if (!choose(cone, NULL, d)) return 0;
     for (integer k = 0; k < d; k++)
         for (integer j = 0; j < d; j++) cone->work[k * 2 * d + j] = cone->rows[cone->basis[k] * d + j];
-    if (!invert(cone->work, d, 1e-13, cone->inverse)) return 0;
+    if (!invert(cone->work, d, SINGULAR, cone->inverse)) return 0;
     integer *all = cone->beyond; /* the basis: `solved` takes it without one row */
     for (integer k = 0; k < d; k++) all[k] = cone->basis[k];
     for (integer k = 0; k < d; k++)
@@ -167,6 +169,14 @@ static int adjacent(const Cone *cone, integer p, integer q, integer *blocker)
     return 1;
 }
 
+/* Whether a ray is surely inside all rows that were taken but those that it lies on. */
+static int beside_others(const Cone *cone, const double *ray, const uint64_t *on)
+{
+    for (integer i = 0; i < cone->m; i++)
+        if (cone->taken[i] && !lies_on(on, i) && !(dot(cone->rows + i * cone->d, ray, cone->d) <= -BESIDE)) return 0;
+    return 1;
+}
+
 /* Where the edge between two rays meets a row: a ray of its own. 0 if it is not certain. */
 static int joined(Cone *cone, integer p, integer q, integer row, integer to)
 {
@@ -182,7 +192,7 @@ static int joined(Cone *cone, integer p, integer q, integer row, integer to)
     for (integer j = 0; j < d; j++) fresh[j] *= length;
     for (integer w = 0; w < words; w++) on[w] = cone->common[w];
     mark(on, row);
-    return choose(cone, on, d - 1) && solved(cone, fresh);
+    return choose(cone, on, d - 1) && solved(cone, fresh) && beside_others(cone, fresh, on);
 }
 
 static void move(Cone *cone, integer from, integer to)
@@ -219,29 +229,72 @@ static integer cut(Cone *cone, integer row)
     return cone->count = put;
 }
 
-/* Rays (room, d) of the cone of rows at (d, m), transposed, of length about one; and the rows that each lies on, as bits
- * (room, words). Their number, or why not. As points: with y_(d-1) = 1, and none may lie on the last row. */
-integer near_cone(integer d, integer m, const double *at, int as_points, integer room, double *rays, uint64_t *on,
-                  double *block)
+/* Rays (room, d) of length one of the cone of rows (m, d) of length about one; and the rows that each lies on, as bits
+ * (room, words). Their number, or why not. */
+static integer describe(Cone *cone)
+{
+    if (cone->room < cone->d) return NO_ROOM_FOR_RAYS;
+    if (!begin_cone(cone)) return UNCERTAIN;
+    for (integer i = 0; i < cone->m; i++) cone->taken[i] = 0;
+    for (integer k = 0; k < cone->d; k++) cone->taken[cone->basis[k]] = 1;
+    for (integer i = 0; i < cone->m; i++) {
+        if (cone->taken[i]) continue;
+        const integer found = cut(cone, i);
+        if (found < 0) return found;
+        cone->taken[i] = 1;
+    }
+    return cone->count;
+}
+
+/* Rays (room, d) of the cone of rows at (d, m), transposed, of length about one. */
+integer near_cone(integer d, integer m, const double *at, integer room, double *rays, uint64_t *on, double *block)
 {
     Cone cone;
     lay_out(&cone, block, d, m, room);
     cone.rays = rays, cone.on = on;
     for (integer i = 0; i < m; i++)
         for (integer j = 0; j < d; j++) cone.rows[i * d + j] = at[j * m + i];
-    if (room < d) return NO_ROOM_FOR_RAYS;
-    if (!begin_cone(&cone)) return UNCERTAIN;
-    for (integer i = 0; i < m; i++) cone.taken[i] = 0;
-    for (integer k = 0; k < d; k++) cone.taken[cone.basis[k]] = 1;
+    return describe(&cone);
+}
+
+/* The rows a'x <= b t, given as (a, -b), seen from a point inside, each over its slack there, along axes whose units
+ * make the steepest entries about one; the last row is t >= 0. 0 if the point is not inside. */
+static int centred_rows(const Cone *cone, const double *at, const double *centre, double *unit)
+{
+    const integer d = cone->d, m = cone->m;
+    fill(unit, 0.0, d);
     for (integer i = 0; i < m; i++) {
-        if (cone.taken[i]) continue;
-        const integer found = cut(&cone, i);
-        if (found < 0) return found;
+        double *row = cone->rows + i * d, slack = i < m - 1 ? -at[(d - 1) * m + i] : 1.0;
+        for (integer j = 0; j < d - 1; j++) slack -= at[j * m + i] * centre[j];
+        if (!(slack > 0.0)) return 0;
+        for (integer j = 0; j < d - 1; j++) row[j] = at[j * m + i] / slack, unit[j] = larger(fabs(row[j]), unit[j]);
+        row[d - 1] = -1.0;
     }
-    for (integer r = 0; as_points && r < cone.count; r++) {
+    for (integer j = 0; j < d - 1; j++) unit[j] = 1.0 / unit[j];
+    for (integer i = 0; i < m; i++)
+        for (integer j = 0; j < d - 1; j++) cone->rows[i * d + j] *= unit[j];
+    return 1;
+}
+
+/* Points (room, d) of a bounded set, their last entry one, as rays of its cone; at as above, centre (d,) inside. */
+integer near_points(integer d, integer m, const double *at, const double *centre, integer room, double *rays,
+                    uint64_t *on, double *block)
+{
+    Cone cone;
+    double *unit = block + lay_out(&cone, block, d, m, room);
+    cone.rays = rays, cone.on = on;
+    if (!centred_rows(&cone, at, centre, unit)) return UNCERTAIN;
+    const integer count = describe(&cone);
+    for (integer r = 0; r < count; r++) {
+        double *ray = rays + r * d;
         if (lies_on(on + r * cone.words, m - 1) || !choose(&cone, on + r * cone.words, d - 1)) return UNCERTAIN;
-        if (!solved(&cone, rays + r * d)) return UNCERTAIN;
-        to_point(d, m, at, cone.basis, cone.inverse, cone.work, rays + r * d);
+        for (integer j = 0; j < d - 1; j++) ray[j] = centre[j] + unit[j] * ray[j] / ray[d - 1];
+        ray[d - 1] = 1.0;
+        for (integer k = 0; k < d; k++)
+            for (integer j = 0; j < d; j++)
+                cone.work[k * 2 * d + j] = k < d - 1 ? at[j * m + cone.basis[k]] : ray[j];
+        if (!invert(cone.work, d, SINGULAR, cone.inverse)) return UNCERTAIN;
+        to_point(d, m, at, cone.basis, cone.inverse, cone.work, ray);
     }
-    return cone.count;
+    return count;
 }

@@ -75,6 +75,8 @@ integer optimise(const Rows *rows, const double *c, State *at, double scale);
 double dual_bound(const Rows *rows, const double *c, State *at, double *beside, double *spare, double *work);
 
 /* centre.c */
+integer fdi_strictly_inside(integer d, integer m, const double *at, const double *b, const double *z,
+                            const double *of_rows, const double *of_rhs, double *room);
 integer distinct(const Rows *rows, integer *chosen, Memory memory);
 integer distinct_room(integer d, integer m);
 int centred(const Rows *rows, const integer *chosen, integer k, const double *x0, double *at, double *b, Memory memory);
@@ -120,8 +122,9 @@ integer fdi_cone_rays(integer d, integer m, const double *at, const double *inne
 
 /* near_cone.c */
 integer near_cone_room(integer d, integer m, integer room);
-integer near_cone(integer d, integer m, const double *at, int as_points, integer room, double *rays, uint64_t *on,
-                  double *block);
+integer near_cone(integer d, integer m, const double *at, integer room, double *rays, uint64_t *on, double *block);
+integer near_points(integer d, integer m, const double *at, const double *centre, integer room, double *rays,
+                    uint64_t *on, double *block);
 
 /* volume.c */
 integer volume_room(integer n, integer m, integer k);

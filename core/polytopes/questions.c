@@ -16,11 +16,11 @@ EXPORTED integer fdi_prepared_size(integer d, integer m)
 
 EXPORTED integer fdi_prepared_room(integer d, integer m)
 {
-    return d + 1 + m + d + most(fdi_scaled_room(m, d), fdi_interior_room(d, m));
+    return d + 1 + m + d + most(2 * m, most(fdi_scaled_room(m, d), fdi_interior_room(d, m)));
 }
 
-/* Prepares rows (m, d), rhs (m,); 0 if one is zero or out of reach, or if the largest ball is not clear: found, and of a
- * radius above so much of the size of b. times: as fdi_interior.
+/* Prepares rows (m, d), rhs (m,); 0 if one is zero or out of reach, or if the largest ball is not clear: found, of a
+ * radius above so much of the size of b, its centre inside whatever was rounded. times: as fdi_interior.
  */
 EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const double *rhs, double times, double least_ball,
                               double *prepared, double *block)
@@ -36,7 +36,8 @@ EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const do
     *set.radius = found[d], *set.size = scale_of(&all), set.reach[0] = NAN;
     copy(set.centre, found, d);
     copy(set.multipliers, found + d + 1, m);
-    return status == OPTIMAL && found[d] > least_ball * *set.size;
+    if (status != OPTIMAL || !(found[d] > least_ball * *set.size)) return 0;
+    return fdi_strictly_inside(d, m, set.at, set.b, set.centre, NULL, NULL, scratch);
 }
 
 EXPORTED integer fdi_prepared_ball_room(integer d, integer m) { return d + 1 + 2 * m + fdi_interior_room(d, m); }
@@ -72,6 +73,9 @@ EXPORTED integer fdi_prepared_ball(integer d, integer m, const double *rows, dou
     return 1;
 }
 
+static const integer MANY = 30;     /* coordinates from which programs along all axes take long */
+static const double TIGHT = 1e-12; /* gap, of the terms, that rounding leaves */
+
 typedef struct {
     double *forms, *found, *gaps;
     integer *tops, *codes;
@@ -91,7 +95,7 @@ static integer lay_out_question(Question *question, double *block, integer d, in
 EXPORTED integer fdi_prepared_supports_room(integer d, integer m, integer k)
 {
     Question own, axes;
-    return lay_out_question(&own, NULL, d, m, k) + lay_out_question(&axes, NULL, d, m, 2 * d);
+    return lay_out_question(&own, NULL, d, m, k) + lay_out_question(&axes, NULL, d, m, 2 * d) + 4 * d * d;
 }
 
 static void solve(const Prepared *set, integer d, integer m, integer k, const Question *question, double *weights)
@@ -125,6 +129,68 @@ static int find_reach(Prepared *set, integer d, integer m, double *block)
     return 1;
 }
 
+/* Bounds (d,) of |x| over the set from the rows W whose multipliers y prove its largest ball; 0 if there are none.
+ *
+ * y'A is about zero, so that no slack of a row in W is above y'b / y_i, and seen from the centre c no |a_i'(x - c)| is
+ * above that. With R the inverse of d of these rows, |x - c| <= |R| times that, up to what rounding left: of R, F = R A - I,
+ * and e = y'A, both of which count with |x| itself.
+ */
+static int reach_of_ball(Prepared *set, integer d, integer m, double *block)
+{
+    Memory memory = {block, 0};
+    integer *W = integers(&memory, d + 1), count = 0, least_one = 0;
+    double *work = doubles(&memory, 2 * d * d), *R = doubles(&memory, d * d), *e = doubles(&memory, d);
+    double *most_slack = doubles(&memory, d + 1), total = 0.0, missed = 0.0, centre = 0.0, far = 0.0, turned = 0.0;
+    for (integer i = 0; i < m; i++) {
+        if (!(set->multipliers[i] > 0.0)) continue;
+        if (count > d) return 0;
+        W[count++] = i;
+    }
+    if (count <= d || !(*set->radius < INFINITY)) return 0;
+    double terms = 0.0;
+    for (integer k = 0; k <= d; k++) {
+        const double part = set->multipliers[W[k]] * set->b[W[k]];
+        total += part, terms += fabs(part);
+        if (set->multipliers[W[k]] < set->multipliers[W[least_one]]) least_one = k;
+    }
+    total += (double)(d + 4) * EPS * terms;
+    for (integer j = 0; j < d; j++) {
+        double sum = 0.0, size = 0.0;
+        for (integer k = 0; k <= d; k++) {
+            const double part = set->multipliers[W[k]] * set->at[j * m + W[k]];
+            sum += part, size += fabs(part);
+        }
+        missed += fabs(sum) + (double)(d + 4) * EPS * size, centre = larger(centre, fabs(set->centre[j]));
+    }
+    W[least_one] = W[d];
+    const Rows rows = {d, m, m, set->at, set->b};
+    if (!invert_basis(&rows, W, R, work)) return 0;
+    for (integer k = 0; k < d; k++) most_slack[k] = (total + missed * centre) / set->multipliers[W[k]];
+    for (integer j = 0; j < d; j++) { /* Q = R transposed: edge k is column k of R */
+        double sum = 0.0, again = 0.0;
+        for (integer k = 0; k < d; k++) {
+            const double entry = fabs(R[k * d + j]);
+            sum += entry * (most_slack[k] + *set->radius), again += entry * missed / set->multipliers[W[k]];
+        }
+        far = larger(far, sum), e[j] = again;
+    }
+    for (integer j = 0; j < d; j++) {
+        double off = e[j];
+        for (integer l = 0; l < d; l++) {
+            double sum = j == l ? -1.0 : 0.0, size = 1.0;
+            for (integer k = 0; k < d; k++) {
+                const double part = R[k * d + j] * set->at[l * m + W[k]];
+                sum += part, size += fabs(part);
+            }
+            off += fabs(sum) + (double)(d + 4) * EPS * size;
+        }
+        turned = larger(turned, off);
+    }
+    if (!(turned < 0.25 && far < INFINITY)) return 0;
+    for (integer j = 0; j < d; j++) set->reach[j] = fabs(set->centre[j]) + 1.5 * far;
+    return 1;
+}
+
 /* Forms (k, d) in the units of the set, their largest entries about one. */
 static void scale_forms(const Prepared *set, integer d, integer k, const double *directions, const Question *question)
 {
@@ -136,17 +202,31 @@ static void scale_forms(const Prepared *set, integer d, integer k, const double 
     }
 }
 
+/* Whether the bounds that were proven are as near to the values at the points as rounding lets them be. */
+static int tight(integer k, integer d, const Question *question)
+{
+    const integer *status = question->codes + k * d;
+    for (integer q = 0; q < k; q++)
+        if (status[q] == OPTIMAL && !(question->gaps[k + q] <= TIGHT * question->gaps[2 * k + q])) return 0;
+    return 1;
+}
+
+/* The bounds of the forms that were solved, by a bound of |x|: in many coordinates first by one that costs nothing. */
 static int bounds_of(Prepared *set, integer d, integer m, integer k, const Question *question, double *spare_block)
 {
     const double *beside = question->found + 2 * k * d, *bounds = beside + k * d;
-    int rounded = 0;
+    int rounded = 0, known = 0;
     for (integer q = 0; q < k * d; q++) rounded |= beside[q] > 0.0;
-    if (rounded && isnan(set->reach[0]) && !find_reach(set, d, m, spare_block)) {
-        set->reach[0] = NAN;
-        return 0;
+    known = !rounded || !isnan(set->reach[0]);
+    for (int careful = !known && d < MANY; careful < 2; careful++) {
+        if (!known && !(careful ? find_reach(set, d, m, spare_block) : reach_of_ball(set, d, m, spare_block))) continue;
+        fdi_gaps(d, k, question->forms, question->found, bounds, bounds + k, beside, set->reach, question->gaps);
+        if (known || careful) return 1;
+        set->reach[0] = NAN; /* only the nearer one is kept */
+        if (tight(k, d, question)) return 1;
     }
-    fdi_gaps(d, k, question->forms, question->found, bounds, bounds + k, beside, set->reach, question->gaps);
-    return 1;
+    set->reach[0] = NAN;
+    return 0;
 }
 
 /* Upper bounds (k,) of the supports of a prepared set along directions (k, d), infinite where it is unbounded.

@@ -1,4 +1,4 @@
-"""Vertices and facets in general position, proven by the compiled core, against exact integers."""
+"""Vertices and facets by the compiled core, in general position and nearly not, against exact integers."""
 
 import itertools
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import pytest
 from polytopes import HPolytope, kernel
 from polytopes.checks import Floats
 from polytopes.exact_generators import integer_form
-from polytopes.general_position import simple_vertices, simplicial_facets
+from polytopes.general_position import listed_vertices, simplicial_facets
 from polytopes.minkowski_weyl import ExactGenerators, generators_of
 
 
@@ -22,6 +22,10 @@ def random_set(rng: np.random.Generator, n: int, m: int) -> HPolytope:
     """Rows around the origin, in units of their own."""
     units = 2.0 ** rng.integers(-30, 31, n)
     return HPolytope(rng.standard_normal((m, n)) * units, rng.uniform(0.5, 1.5, m))
+
+
+def listed(P: HPolytope) -> Floats | None:
+    return None if P.prepared is None else listed_vertices(P.prepared)
 
 
 def incidences(P: HPolytope, V: list[list[Fraction]]) -> list[int]:
@@ -39,9 +43,9 @@ def test_vertices_of_random_sets_are_all_of_them() -> None:
     for _ in range(60):
         n = int(rng.integers(2, 6))
         P = random_set(rng, n, int(rng.integers(n + 1, 14)))
-        V, exact = simple_vertices(P.program), exactly(P)
+        V, exact = listed(P), exactly(P)
         if V is None:
-            assert len(exact.rays) or P.program.interior.radius == np.inf or not P.program.fat
+            assert len(exact.rays) or P.program.interior.radius == np.inf or P.prepared is None
             continue
         proven += 1
         assert not len(exact.rays)
@@ -105,17 +109,32 @@ def test_sets_that_are_nearly_degenerate_are_told_rightly_or_not_at_all(
         assert distances.min(axis=0).max() < 1e-12 * np.abs(exact.points).max()
 
 
-def test_degenerate_and_unbounded_sets_are_left_to_others() -> None:
-    rng = np.random.default_rng(1)
-    for n in (2, 3, 4):
-        for _ in range(6):
-            A, b = degenerate(rng, n)
-            if len(A) == 2**n and n < 3:
-                continue
-            assert simple_vertices(HPolytope(A, b).program) is None
-    assert simple_vertices(HPolytope([[1.0, 0.5], [-1.0, 0.5]], [1.0, 1.0]).program) is None
-    assert simple_vertices(HPolytope([[1.0, 0.0]], [1.0]).program) is None
-    assert simple_vertices(HPolytope(np.zeros((0, 2)), np.zeros(0)).program) is None
+@pytest.mark.parametrize("exponent", [-60, -54, -50, -45, -40, -36, -33, -30, -25, -8])
+def test_vertices_of_degenerate_sets_are_those_that_rounding_can_tell_apart(exponent: int) -> None:
+    rng, answered = np.random.default_rng([7, -exponent]), 0
+    for _ in range(20):
+        P = nearly_degenerate(rng, exponent)
+        units = 2.0 ** rng.integers(-20, 21, P.dim)
+        turn = np.linalg.qr(rng.standard_normal((P.dim, P.dim)))[0] if rng.integers(2) else np.eye(P.dim)
+        P = HPolytope(P.A @ turn * units, P.b)
+        V = listed(P)
+        if V is None:
+            continue
+        answered += 1
+        points, directions = exactly(P).points, rng.standard_normal((60, P.dim)) * units
+        assert len(V) <= len(points)
+        assert (V @ P.A.T - P.b).max() < 1e-10
+        np.testing.assert_allclose((directions @ V.T).max(axis=1), (directions @ points.T).max(axis=1), atol=1e-9)
+    assert answered > 10 or -42 < exponent < -25
+
+
+def test_unbounded_and_empty_sets_are_left_to_others() -> None:
+    assert listed(HPolytope([[1.0, 0.5], [-1.0, 0.5]], [1.0, 1.0])) is None
+    assert listed(HPolytope([[1.0, 0.0]], [1.0])) is None
+    assert listed(HPolytope(np.zeros((0, 2)), np.zeros(0))) is None
+    assert listed(HPolytope([[1.0, 0.1], [-1.0, -0.1]], [-1.0, 0.5])) is None
+    strip = HPolytope([[1.0, 0.3], [-1.0, -0.3], [0.1, 1.0]], [1.0, 1.0, 1.0])
+    assert listed(strip) is None
 
 
 def test_facets_of_random_points_are_all_of_them() -> None:
@@ -146,7 +165,7 @@ def test_room_for_many_rays() -> None:
     rng = np.random.default_rng(4)
     A = rng.standard_normal((30, 7))
     P = HPolytope(A / np.linalg.norm(A, axis=1)[:, None], rng.uniform(0.9, 1.1, 30))
-    V = simple_vertices(P.program)
+    V = listed(P)
     assert V is not None
     assert len(V) > 500
     GT = np.vstack([np.eye(3), -np.ones((1, 3))])

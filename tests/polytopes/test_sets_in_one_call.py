@@ -1,0 +1,150 @@
+"""Sets that one call of the core answers for: short ones are exact, hulls hold all points, volumes are right."""
+
+import itertools
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from polytopes import HPolytope
+from polytopes.checks import Floats
+from polytopes.exact_generators import integer_form
+from polytopes.exact_sides import exact_form
+from polytopes.general_position import rows_around, summed_volume
+from polytopes.integers import floats_of_points, integer_rows
+from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
+from polytopes.outward import float_rows
+from polytopes.short_sets import short_hull, short_vertices, short_volume
+
+
+def short_rows(rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Rows of integers or short fractions: some bounded, some not, some empty or flat, in units of their own."""
+    n = int(rng.integers(1, 5))
+    A, b = rng.integers(-3, 4, (int(rng.integers(n + 1, 10)), n)).astype(float), rng.integers(-1, 6, 20).astype(float)
+    if rng.integers(2):
+        A = np.vstack([A, np.eye(n), -np.eye(n)])
+    return np.ldexp(A, int(rng.integers(-20, 20))), np.ldexp(b[: len(A)], int(rng.integers(-3, 4)))
+
+
+def test_vertices_of_short_rows_are_those_in_integers_of_any_size() -> None:
+    rng, known = np.random.default_rng(0), 0
+    for _ in range(200):
+        A, b = short_rows(rng)
+        A, b = A[: len(b)], b[: len(A)]
+        exact = generators_of(integer_form(A, b, A[:0], b[:0]))
+        found = short_vertices(A, b)
+        if found is None:
+            assert len(exact.rays) or len(exact.lines) or not len(exact.vertices)
+            continue
+        known += 1
+        assert not len(exact.rays)
+        points = floats_of_points(exact.vertices)
+        np.testing.assert_array_equal(found.points, points[np.lexsort(points.T[::-1])])
+        fractions = [[Fraction(int(v), int(row[-1])) for v in row[:-1]] for row in exact.vertices.tolist()]
+        floats = [[Fraction(v) for v in row] for row in points.tolist()]
+        assert found.exact == (fractions == floats)
+    assert known > 60
+
+
+def test_hulls_of_short_points_are_those_in_integers_of_any_size() -> None:
+    rng, known = np.random.default_rng(1), 0
+    for _ in range(150):
+        n = int(rng.integers(1, 5))
+        V = np.ldexp(rng.integers(-4, 5, (int(rng.integers(n + 1, 12)), n)).astype(float), int(rng.integers(-20, 20)))
+        found = short_hull(V)
+        points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
+        nothing = np.zeros((0, n), np.int64)
+        A, b, C, _ = float_rows(ExactGenerators(distinct(points), nothing, nothing))
+        if found is None:
+            assert len(C)
+            continue
+        known += 1
+        assert {tuple(row) for row in found} == {tuple(row) for row in np.hstack([A, b[:, None]])}
+    assert known > 100
+
+
+def test_numbers_that_do_not_fit_are_left_to_larger_integers() -> None:
+    assert short_vertices(np.array([[1.0], [-1.0]]), np.array([0.1, 0.0])) is None
+    assert short_hull(np.array([[0.1], [0.2]])) is None
+    large = np.array([[2.0**31 - 1, 1.0], [1.0, 2.0**31 - 1], [-(2.0**31 - 3), 3.0], [5.0, -(2.0**31 - 5)]])
+    assert short_vertices(large, np.array([2.0**31 - 7, 3.0, 5.0, 2.0**31 - 9])) is None
+    P = HPolytope(large, np.array([2.0**31 - 7, 3.0, 5.0, 2.0**31 - 9]))
+    assert [tuple(map(float, v)) for v in P.vertices(exact=True)] == [tuple(v) for v in P.vertices().tolist()]
+
+
+def cyclic(rng: np.random.Generator) -> Floats:
+    return rng.uniform(-1.0, 1.0, (9, 1)) ** np.arange(1, int(rng.integers(3, 5)))
+
+
+def permuted(rng: np.random.Generator) -> Floats:
+    return np.array(list(itertools.permutations(range(4))))[:, :3] @ np.linalg.qr(rng.standard_normal((3, 3)))[0]
+
+
+def lattice(rng: np.random.Generator) -> Floats:
+    """Points in common faces, some inside, some twice."""
+    grid = np.array(list(itertools.product([-1.0, 0.0, 1.0], repeat=3)))
+    some = np.vstack([grid[rng.permutation(27)[:20]], grid[:1], grid[-1:]])
+    return some @ np.linalg.qr(rng.standard_normal((3, 3)))[0]
+
+
+def bumped(size: float) -> Floats:
+    """A cube with a pyramid on a face, so flat that its facets are nearly the face's."""
+    return np.vstack([list(itertools.product([-1.0, 1.0], repeat=3)), [[0.1, 0.2, 1.0 + size]]]) / 3.0
+
+
+POINTS = {
+    "cyclic": cyclic,
+    "permuted": permuted,
+    "lattice": lattice,
+    "random": lambda rng: rng.standard_normal((12, int(rng.integers(1, 5)))),
+    **{f"bump of 1e-{k}": lambda rng, k=k: bumped(10.0**-k) for k in range(8, 17)},
+}
+
+
+@pytest.mark.parametrize("kind", POINTS)
+def test_a_hull_in_floats_holds_every_point_exactly_and_reaches_no_further(kind: str) -> None:
+    rng, found = np.random.default_rng([3, len(kind)]), 0
+    for _ in range(6):
+        V = POINTS[kind](rng)
+        units = 2.0 ** rng.integers(-30, 31, V.shape[1])
+        V = V * units
+        rows = rows_around(V)
+        if rows is None:
+            continue
+        found += 1
+        for row in rows:
+            assert max(exact_form(row[:-1], v) for v in V) <= Fraction(row[-1])
+        P = HPolytope(rows[:, :-1], rows[:, -1])
+        directions = rng.standard_normal((40, len(units))) / units
+        excess = P.support(directions) - (V @ directions.T).max(axis=0)
+        assert excess.max() < 1e-9 * np.ptp(V @ directions.T, axis=0).max()
+        assert len(P.remove_redundancy().b) == len(rows)
+    assert found or kind in ("bump of 1e-9", "bump of 1e-10")
+
+
+@pytest.mark.parametrize("kind", ["cyclic", "permuted", "lattice", "random"])
+def test_volumes_by_simplices_are_right(kind: str) -> None:
+    rng, found = np.random.default_rng([4, len(kind)]), 0
+    for _ in range(5):
+        V = POINTS[kind](rng) * 2.0 ** float(rng.integers(-30, 31))
+        P = HPolytope.from_vertices(V)
+        exact = P.volume(exact=True)
+        volume = None if P.prepared is None else summed_volume(P.prepared)
+        assert P.volume() == pytest.approx(float(exact), rel=1e-9)
+        found += volume is not None
+        assert volume is None or volume == pytest.approx(float(exact), rel=1e-11)
+    assert found
+
+
+def test_volumes_of_short_sets_are_right() -> None:
+    rng, found = np.random.default_rng(5), 0
+    for _ in range(60):
+        A, b = short_rows(rng)
+        A, b = A[: len(b)], b[: len(A)]
+        volume = short_volume(A, b)
+        if volume is not None:
+            found += 1
+            assert volume == pytest.approx(float(HPolytope(A, b).volume(exact=True)), rel=1e-13)
+    assert found > 15
+    assert short_volume(np.vstack([np.eye(9), -np.eye(9)]), np.ones(18)) is None  # 9! simplices
+    assert HPolytope.cross_polytope(5).volume() == pytest.approx(2.0**5 / 120.0, rel=1e-14)
