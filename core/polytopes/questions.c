@@ -3,6 +3,8 @@
  * Only what floats settle at once is answered: rows without zeros whose largest ball is not small, and forms whose
  * multipliers prove a bound near the value at the point that was found. All else is left to whoever asks.
  */
+#include <float.h>
+
 #include "polytopes/polytopes.h"
 #include "polytopes/prepared.h"
 #include "powers.h"
@@ -259,7 +261,7 @@ EXPORTED integer fdi_prepared_supports(integer d, integer m, integer k, double *
             for (integer j = 0; j < d; j++) points[q * d + j] = times_power(question.found[q * d + j], set.s[j]);
         if (weights)
             for (integer i = 0; i < m; i++)
-                weights[q * m + i] = times_power(weights[q * m + i], set.r[i] + question.tops[q]);
+                weights[q * m + i] = smaller(times_power(weights[q * m + i], set.r[i] + question.tops[q]), DBL_MAX);
     }
     return 1;
 }
