@@ -33,7 +33,7 @@ def test_the_computed_remainder_holds_what_is_left_out(seed: int, Ts: float) -> 
         for name, given in (("A", A), ("B", B), ("E", E), ("a", a))
     }  # fmt: skip
     held = true["B"] @ u + true["E"] @ w + true["a"]
-    way = np.array([_held(true["A"], held, x, t) for t in np.linspace(0.0, Ts, 201)])
+    way = np.array([_held(true["A"], held, x, t) for t in np.linspace(0.0, Ts, 51)])
     bounds = {"x": 1.001 * np.abs(way).max(axis=0), "u": np.abs(u), "w": [0.5]}
     width = remainder_bound(A, B, Ts=Ts, E=E, a=a, uncertainties=items, **bounds)  # type: ignore[arg-type]
     model = UncertainModel.from_continuous(

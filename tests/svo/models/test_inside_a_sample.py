@@ -87,7 +87,7 @@ class Plant:
 VARYING: list[tuple[str, ...]] = [(), ("w",), ("Delta",), ("all",), ("w[0]", "Delta[1]")]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 1.0), st.sampled_from(VARYING))
 def test_the_next_state_is_within_the_remainder(seed: int, Ts: float, varying: tuple[str, ...]) -> None:
     """With the means over the sample of what varies; the oracle is the exponential of each part of the sample."""

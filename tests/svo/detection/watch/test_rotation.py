@@ -112,7 +112,7 @@ def test_no_way_of_rotation_loses_or_invents_an_alarm(tmp_path: Path, way: str, 
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(5))
 def test_random_rotation_and_restarts(tmp_path: Path, seed: int, end: str) -> None:
     rng = np.random.default_rng([seed, len(end), ord(end[0])])
     logger = Logger(tmp_path / "log.csv", LINES, end)
