@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from polytopes import native
-from polytopes.native import Address, Entries, Given, Integer, Real
+from polytopes.native import Address, Given, Integer, Real
 from svo.checks import Array
 from svo.models import NormalForm
 from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
@@ -15,8 +15,8 @@ from svo.models.nonlinear.plant_kernel import PlantKernel
 from svo.observers.window_kernel import UNLIMITED, told
 
 _follow = native.function(
-    "fdi_relinearised_follow", *[Address] * 2, Given, *[Address] * 2, Integer, *[Given] * 4, Real, Integer, Address,
-    *[Entries] * 2, returns=Integer,
+    "fdi_relinearised_follow", *[Address] * 2, Given, *[Address] * 2, Integer, *[Given] * 4, Real, Integer,
+    *[Address] * 3, returns=Integer,
 )  # fmt: skip
 
 TAKEN, WITHOUT_ROOM, BOX_WITHOUT_ROOM, NOT_MOVED, NOT_MEASURED = range(5)  # as in `core/relinearised/follow.c`
@@ -77,7 +77,11 @@ class Carried:
         Of the newest state.
     now, before : Linearisation
         Of the newest sample, without a transition, and of the one before it.
+    result, why : (2,) int, (8,) arrays
+        How the last call ended.
     address : int
+    to_result : tuple of int
+        Addresses of ``result`` and ``why``.
     """
 
     def __init__(self, model: NonlinearModel) -> None:
@@ -85,7 +89,7 @@ class Carried:
         rows = n + ny, model.n_inputs + 1 + model.carrier.n_disturbances + n
         self._shape, self._nu = rows, model.n_inputs
         size = rows[0] * rows[1]
-        self._lengths = [n, n, size, ny, size, ny, 4 * n + size]  # the last: scratch
+        self._lengths = [n, n, size, ny, size, ny, 4 * n + size, 2, 8]  # the third from behind is scratch
         self._block = np.zeros(sum(self._lengths))
         self._find()
 
@@ -98,7 +102,11 @@ class Carried:
 
     def _find(self) -> None:
         self.address = native.address(self._block)
-        low, high, now, now_noise, before, noise, _ = np.split(self._block, np.cumsum(self._lengths[:-1]))
+        low, high, now, now_noise, before, noise, _, result, self.why = np.split(
+            self._block, np.cumsum(self._lengths[:-1])
+        )
+        self.result = result.view(np.int64)
+        self.to_result = native.address(self.result), native.address(self.why)
         self.box = Span(low, high)
         self.now = Linearisation(now.reshape(self._shape), now_noise, self._nu)
         self.before = Linearisation(before.reshape(self._shape), noise, self._nu)
@@ -139,10 +147,10 @@ def follow(
     boxes : (k, 2, n) array, optional
         Filled with the boxes of the samples that are consistent.
     """
-    result, why, count = np.zeros(2, dtype=np.int64), np.zeros(8), len(samples.T)
+    to_boxes = None if boxes is None else native.address(boxes)
     done = _follow(
-        window, plant.address, units, carried.address, native.scratch(plant.room), count, *samples, eps, UNLIMITED,
-        None if boxes is None else native.address(boxes), result, why,
+        window, plant.address, units, carried.address, native.scratch(plant.room), len(samples.T), *samples, eps,
+        UNLIMITED, to_boxes, *carried.to_result,
     )  # fmt: skip
-    end, of_next = result.tolist()
-    return Followed(done, end, told(of_next), plant.undecided(why) if end == NOT_MOVED else None)
+    end, of_next = carried.result.tolist()
+    return Followed(done, end, told(of_next), plant.undecided(carried.why) if end == NOT_MOVED else None)

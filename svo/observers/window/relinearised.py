@@ -130,7 +130,7 @@ class Relinearised:
 
     def sample(self, u: Array, u_next: Array, y: Array, dt: float | None) -> PlantSamples:
         """One, ``dt`` seconds after the newest; None = the model's ``Ts``."""
-        return PlantSamples(u[None], u_next[None], y[None], np.full(1, dt or self.model.Ts))
+        return PlantSamples(u[None], u_next[None], y[None], np.array([dt or self.model.Ts]))
 
     def samples(self, log: Log, first: int, last: int, needs_next: bool) -> PlantSamples | None:
         """Samples ``first`` to ``last`` - 1 of a log; None where the first needs more than one call of the core.

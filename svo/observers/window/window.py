@@ -155,16 +155,18 @@ class Window:
         """As `take_many`, of a nonlinear plant; the sample after them is not taken where it is not linearised."""
         memory, eps, self.reason = self.memory, self.settings.eps, None
         memory.check_whole()
-        done, end = 0, WITHOUT_ROOM
-        while end == WITHOUT_ROOM:
-            own = None if boxes is None else boxes[done:]
-            found = plant.follow(memory.address, samples.after(done) if done else samples, eps, own)
-            done, end = done + found.done, found.end
-            if end in (WITHOUT_ROOM, BOX_WITHOUT_ROOM):
-                memory.enlarge(2 * memory.size.K)
-        told = memory.go_on(found.told, eps) if end == TAKEN else found.told
-        self._given = samples.y[min(done, len(samples.y) - 1)]
-        return found._replace(done=done, told=told)
+        found, count = plant.follow(memory.address, samples, eps, boxes), len(samples.T)
+        while found.end in (WITHOUT_ROOM, BOX_WITHOUT_ROOM):
+            memory.enlarge(2 * memory.size.K)
+            if found.end == BOX_WITHOUT_ROOM:
+                break
+            done = found.done
+            rest = plant.follow(memory.address, samples.after(done), eps, None if boxes is None else boxes[done:])
+            found = rest._replace(done=done + rest.done)
+        if found.done < count and found.end == TAKEN:
+            found = found._replace(told=memory.go_on(found.told, eps))
+        self._given = samples.y[min(found.done, count - 1)]
+        return found
 
     @property
     def takes_at_once(self) -> int:
