@@ -19,6 +19,7 @@ from polytopes.errors import EmptySetError, UnboundedError
 from polytopes.generators import rows_of_generators
 from polytopes.inner_template import inner_template
 from polytopes.intersection import rows_of_both
+from polytopes.kept_vertices import moved, of_product
 from polytopes.largest_copy import largest_copy
 from polytopes.minkowski_sum import minkowski_sum
 from polytopes.normalisation import normalised
@@ -78,11 +79,14 @@ class Constructions(Shape):
 
     def translate(self, t: ArrayLike) -> Self:
         """``{x + t : x in P}``, t (n,): exact, right-hand sides that are no floats rounded up."""
-        return type(self)(*motion.translation(self, real_array("t", t, (self.dim,))))
+        shift = real_array("t", t, (self.dim,))
+        return moved(self, type(self)(*motion.translation(self, shift)), np.eye(self.dim), shift)
 
     def scale(self, s: float) -> Self:
         """``{s x : x in P}`` for any number s, exact or rounded up as `translate`; 0 gives the origin, or nothing."""
-        return type(self)(*motion.scaled(self, real_number("s", s)))
+        factor = real_number("s", s)
+        made = type(self)(*motion.scaled(self, factor))
+        return moved(self, made, factor * np.eye(self.dim), np.zeros(self.dim))
 
     def slice(self, fixed: Mapping[int, float]) -> Self:
         """``{x_rest : x in P, x_j = v_j}``: the set where some coordinates are fixed, in the other coordinates.
@@ -135,7 +139,7 @@ class Constructions(Shape):
 
     def product(self, Q: Rows) -> Self:
         """Cartesian product ``{(x, y) : x in P, y in Q}``."""
-        return type(self)(*product(self, a_set(Q)))
+        return of_product(self, Q, type(self)(*product(self, a_set(Q))))
 
     def preimage(self, M: ArrayLike, t: ArrayLike | None = None) -> Self:
         """``{x : M x + t in P}``: rows multiplied out, outward where they had to be rounded.
@@ -170,7 +174,7 @@ class Constructions(Shape):
         shift = (
             np.zeros(len(matrix)) if t is None else real_array("t", t, (len(matrix),), meaning="one entry per row of M")
         )
-        return type(self)(*affine_image(self, matrix, shift))
+        return moved(self, type(self)(*affine_image(self, matrix, shift)), matrix, shift)
 
     def minkowski_sum(self, Q: Rows) -> Self:
         """``{x + y : x in P, y in Q}``: exact where both are computed with in integers, else outward.

@@ -20,14 +20,18 @@ _LONG_ROWS = 100
 _COORDINATES = 16
 
 
-def exact_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Program) -> ExactGenerators | None:
-    """Generators of a set ``{x : A x <= b, C x = d}`` in integers; None where it is left to floats."""
+def exact_generators(
+    A: Floats, b: Floats, C: Floats, d: Floats, program: Program, known: ExactGenerators | None = None
+) -> ExactGenerators | None:
+    """Generators of a set ``{x : A x <= b, C x = d}`` in integers, `known` or not; None where it is left to floats."""
     if A.shape[1] > _COORDINATES:
         return None
     rows = integer_form(A, b, C, d)
     plain = short(rows.inequalities) and short(rows.equalities)
     if not plain and (b.size + d.size > _LONG_ROWS or wide(program)):
         return None
+    if known is not None:
+        return known
     try:
         return generators_of(rows, SHORT_RAYS if plain else LONG_RAYS)
     except UndecidedError:

@@ -1,7 +1,9 @@
 """Vertices, rays and lines of any set, and the set of given ones."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,9 @@ from polytopes.fractions_given import exact_table, integers_of, primitive_row
 from polytopes.general_position import rows_around
 from polytopes.hull import Spread, outer_rows, point_offsets
 from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, lowest_bit, short, short_vector
-from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
-from polytopes.outward import float_rows
+from polytopes.kept_vertices import among
+from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of, rows_of
+from polytopes.outward import are_exact, float_rows
 from polytopes.rows import Rows, Table
 from polytopes.short_sets import short_hull
 from polytopes.shown import Shown
@@ -66,7 +69,8 @@ def in_integers(P: Rows) -> ExactGenerators:
     UndecidedError
         At the limit of rays.
     """
-    return generators_of(integer_form(P.A, P.b, P.C, P.d)) if P.exact is None else P.exact
+    known = P.exact if P.made_of is None else P.made_of
+    return generators_of(integer_form(P.A, P.b, P.C, P.d)) if known is None else known
 
 
 def exact_vertices(P: Rows) -> list[tuple[Fraction, ...]]:
@@ -114,34 +118,41 @@ def exact_hull(V: Floats) -> Table | None:
 
 
 def rows_of_generators(V: Floats, rays: Floats) -> Table:
-    """Rows A, b, C, d of ``conv(V) + cone(rays)``, k >= 1 points.
+    """Rows A, b, C, d of ``conv(V) + cone(rays)``, k >= 1 points; see `hull_and_vertices`."""
+    return hull_and_vertices(V, rays)[0]
+
+
+def hull_and_vertices(V: Floats, rays: Floats) -> tuple[Table, Callable[[], ExactGenerators] | None]:
+    """The rows, and what finds the vertices where these are exactly those of the points.
 
     In integers where the numbers are short, where there are rays, and where the points are flat; the rows are exact if
     they are floats, and outward else.
     """
     known = None if len(rays) else exact_hull(V)
     if known is not None:
-        return known
+        return known, lambda: among(distinct(integer_rows(np.hstack([V, np.ones((len(V), 1))]))), integer_form(*known))
     unit = _unit(V)
     if unit:
         A, b, C, d = rows_of_generators(np.ldexp(V, -unit), rays)
-        return A, np.ldexp(b, unit), C, np.ldexp(d, unit)
+        return (A, np.ldexp(b, unit), C, np.ldexp(d, unit)), None
     points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
     around = None if len(rays) or short(points) else rows_around(V)
     if around is not None:
-        return around[:, :-1], around[:, -1], np.empty((0, V.shape[1])), np.empty(0)
+        return (around[:, :-1], around[:, -1], np.empty((0, V.shape[1])), np.empty(0)), None
     directions = integer_rows(rays[rays.any(axis=1)])
     exact = short(points) or len(directions) > 0
     spread = None if exact else Spread.of(V)
     if spread is None or (len(V) <= _FEW and spread.rank < V.shape[1]):
         found = ExactGenerators(distinct(points), distinct(directions), directions[:0])
         try:
-            return float_rows(found)
+            rows = rows_of(found)
+            kept = None if len(directions) or not are_exact(rows) else partial(among, found.vertices, rows)
+            return float_rows(found, rows), kept
         except UndecidedError:
             if len(directions):
                 raise
     A, b = outer_rows(spread or Spread.of(V), point_offsets(V))
-    return A, b, np.empty((0, V.shape[1])), np.empty(0)
+    return (A, b, np.empty((0, V.shape[1])), np.empty(0)), None
 
 
 def _unit(V: Floats) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -13,7 +14,8 @@ from polytopes import exchange, plotting
 from polytopes.checks import different_coordinates, real_array, whole_number
 from polytopes.constructions import Constructions
 from polytopes.fractions_given import hold_fractions
-from polytopes.generators import rows_of_fractions, rows_of_generators
+from polytopes.generators import hull_and_vertices, rows_of_fractions
+from polytopes.kept_vertices import keeping, of_box, of_points
 from polytopes.operators import Operators
 from polytopes.piecewise import Union
 from polytopes.shown import Picture, Shown
@@ -71,7 +73,7 @@ class HPolytope(Shown, Operators):
         above, below = np.isfinite(high), np.isfinite(low)
         box = cls(np.vstack([axes[above], -axes[below]]), np.concatenate([high[above], -low[below]]))
         _ = box.as_box  # at once: no question to it then has to look at its rows
-        return box
+        return keeping(box, partial(of_box, low, high))
 
     @classmethod
     def from_vertices(cls, V: ArrayLike, rays: ArrayLike | None = None) -> Self:
@@ -94,7 +96,8 @@ class HPolytope(Shown, Operators):
             raise ValueError(f"V has shape {points.shape}; expected one or more points (none: HPolytope.empty).")
         n = points.shape[1]
         cone = np.empty((0, n)) if rays is None else real_array("rays", rays, ("r", n), meaning="as many columns as V")
-        return cls(*rows_of_generators(points, cone))
+        rows, find = hull_and_vertices(points, cone)
+        return cls(*rows) if find is None else keeping(cls(*rows), find)
 
     @classmethod
     def from_zonotope(cls, Z: ConstrainedZonotope) -> Self:
@@ -117,7 +120,8 @@ class HPolytope(Shown, Operators):
     def simplex(cls, n: int) -> Self:
         """``{x >= 0, x_1 + ... + x_n <= 1}`` in n dimensions."""
         n = whole_number("n", n, least=1)
-        return cls(np.vstack([-np.eye(n), np.ones((1, n))]), np.append(np.zeros(n), 1.0))
+        simplex = cls(np.vstack([-np.eye(n), np.ones((1, n))]), np.append(np.zeros(n), 1.0))
+        return keeping(simplex, lambda: of_points(np.vstack([np.zeros(n), np.eye(n)])))
 
     @classmethod
     def cross_polytope(cls, n: int) -> Self:
@@ -125,7 +129,7 @@ class HPolytope(Shown, Operators):
         if whole_number("n", n, least=1) > 20:
             raise ValueError(f"n is {n}; expected at most 20: a cross-polytope has 2^n rows.")
         signs = np.array(list(itertools.product([1.0, -1.0], repeat=n)))
-        return cls(signs, np.ones(len(signs)))
+        return keeping(cls(signs, np.ones(len(signs))), lambda: of_points(np.vstack([np.eye(n), -np.eye(n)])))
 
     def __repr__(self) -> str:
         equalities = f", {self.d.size} equalities" if self.d.size else ""

@@ -5,12 +5,14 @@ from __future__ import annotations
 from functools import reduce
 from typing import Any, Self
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from polytopes.checks import real_array, whole_number
 from polytopes.constructions import Constructions
 from polytopes.fractions_given import exact_numbers, hold_fractions
 from polytopes.inclusion import broken_row, has_exact_point, has_point
+from polytopes.kept_vertices import moved
 from polytopes.rows import Rows, same_space
 
 
@@ -44,7 +46,7 @@ class Operators(Constructions):
         )
 
     def __neg__(self) -> Self:
-        return type(self)(-self.A, self.b, -self.C, self.d)
+        return moved(self, type(self)(-self.A, self.b, -self.C, self.d), -np.eye(self.dim), np.zeros(self.dim))
 
     def __mul__(self, s: float) -> Self:
         return NotImplemented if isinstance(s, Rows) else self.scale(s)

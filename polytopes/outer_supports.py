@@ -48,7 +48,8 @@ def upper_supports(P: Rows, directions: Floats, uncertain: Floats | None = None)
     most = reach(P)
     if most is None:
         raise UndecidedError("no bound of the points of the set was proved.")
-    return np.nextafter(best.values + (1.0 + (P.dim + 4) * _EPS) * (uncertain @ most), np.inf)
+    known = ~(directions.any(axis=1) | uncertain.any(axis=1))  # of zero the support is zero
+    return np.where(known, 0.0, np.nextafter(best.values + (1.0 + (P.dim + 4) * _EPS) * (uncertain @ most), np.inf))
 
 
 def lower_supports(P: Rows, directions: Floats) -> Floats:
@@ -139,6 +140,8 @@ def exact_support(P: Rows, direction: Floats) -> Fraction | float:
     """
     if not known_nonempty(P):
         return -math.inf
+    if P.made_of is not None:
+        return support_of(P.made_of, direction)
     if P.exact is None and P.program.exact_point is not None:
         outcome = P.program.exact.maximum(direction, P.program.exact_point)
         if outcome.status == "optimal":

@@ -18,7 +18,12 @@ from polytopes.outward_normals import OutwardNormals
 from polytopes.rows import Table
 
 
-def float_rows(generators: ExactGenerators) -> Table:
+def are_exact(rows: ExactRows) -> bool:
+    """Whether `float_rows` rounds none of the minimal rows of a set."""
+    return all(map(are_floats, [*_short_basis(rows.equalities), *rows.inequalities.tolist()]))
+
+
+def float_rows(generators: ExactGenerators, rows: ExactRows | None = None) -> Table:
     """Rows A, b, C, d of a set that contains a nonempty one, and is the same where its rows are floats.
 
     Raises
@@ -26,7 +31,7 @@ def float_rows(generators: ExactGenerators) -> Table:
     UndecidedError
         At the limit of the double description.
     """
-    rows = rows_of(generators)
+    rows = rows_of(generators) if rows is None else rows
     equalities = _short_basis(rows.equalities)
     if not all(are_floats(row[:-1]) for row in [*equalities, *rows.inequalities.tolist()]):
         directions = floats_of_directions(stacked(generators.rays, generators.lines))

@@ -139,7 +139,13 @@ class Rows(Value):
         """The generators in integers, where the set is computed with in integers; see `exact_generators`."""
         if self.prepared is not None and not maybe_short(self.A, self.b) and self.wide:
             return None
-        return exact_generators(self.A, self.b, self.C, self.d, self.program)
+        return exact_generators(self.A, self.b, self.C, self.d, self.program, self.made_of)
+
+    @derived
+    def made_of(self) -> ExactGenerators | None:
+        """The vertices, exactly, where the set was made from them; see `kept_vertices`."""
+        find = self.__dict__.get("finds_vertices")
+        return None if find is None else find()
 
     @derived
     def corners(self) -> Corners | None:

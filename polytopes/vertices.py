@@ -12,6 +12,7 @@ from polytopes.checks import Floats
 from polytopes.errors import UnboundedError, UndecidedError
 from polytopes.frame import UnitBody, unit_body
 from polytopes.integers import floats_of_points
+from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.qhull import dual_hull
 from polytopes.redundancy import facets
 from polytopes.rows import Rows
@@ -31,6 +32,8 @@ def vertices(P: Rows) -> Floats:
     UnboundedError
         If P is unbounded.
     """
+    if P.made_of is not None:
+        return in_order(P.made_of)
     known = quick_vertices(P)
     if known is not None:
         return known.copy()
@@ -39,8 +42,7 @@ def vertices(P: Rows) -> Floats:
     if not is_bounded(P):
         raise UnboundedError("P is unbounded, so its vertices do not describe it; intersect it with a box first.")
     if P.exact is not None:
-        listed_exactly = floats_of_points(P.exact.vertices)
-        return listed_exactly[np.lexsort(listed_exactly.T[::-1])]
+        return in_order(P.exact)
     flat = explicit(P)
     program = flat.program.balanced
     free = program.flat.free
@@ -55,6 +57,12 @@ def vertices(P: Rows) -> Floats:
 def quick_vertices(P: Rows) -> Floats | None:
     """The vertices (k, n) in lexicographic order, where one call of the core finds them; read-only."""
     return P.listed if P.corners is None else P.corners.points
+
+
+def in_order(found: ExactGenerators) -> Floats:
+    """Vertices in integers to the nearest floats, in lexicographic order."""
+    points = floats_of_points(found.vertices) if np.isnan(found.points).any() else found.points
+    return points[np.lexsort(points.T[::-1])]
 
 
 def _interval_ends(rows: Floats, rhs: Floats) -> Floats:
