@@ -1,5 +1,6 @@
 """Faces, triangulations, moments, rays, gauges and polars: against exact rationals, closed forms and each other."""
 
+import itertools
 from fractions import Fraction
 from math import comb, factorial
 
@@ -262,3 +263,31 @@ def test_wrong_questions_of_shape_are_refused() -> None:
         P.incidence().faces(3)
     with pytest.raises(ValueError, match="relative and exact"):
         P.volume(relative=True, exact=True)  # type: ignore[call-overload]
+
+
+def test_vertices_that_share_many_facets_need_not_be_adjacent() -> None:
+    """The join of two squares in R^5: opposite corners of one lie in all four facets over the edges of the other."""
+    square = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    first, second = np.hstack([square, np.zeros((4, 3))]), np.hstack([np.zeros((4, 2)), square, np.ones((4, 1))])
+    P = HPolytope.from_vertices(np.vstack([first, second]))
+    found, joined = P.incidence(), P.adjacency()
+    assert len(found.vertices) == len(found.rows) == 8
+    assert joined.sum(axis=1).tolist() == [6] * 8
+    for i, j in itertools.combinations(range(8), 2):
+        assert joined[i, j] == (not np.array_equal(found.vertices[i, :4], -found.vertices[j, :4]))
+
+
+def test_rows_that_touch_in_a_vertex_or_an_edge_are_no_facets() -> None:
+    cube = HPolytope.box([-1.0] * 3, [1.0] * 3)
+    more = HPolytope([[1, 1, 1], [1, 1, 0], [0, 0, 1], [0, 0, 0], [2, 0, 0]], [3, 2, 1, 0, 2])
+    found = (cube & more).incidence()
+    assert found.rows.tolist() == list(range(6))
+    assert [len(found.faces(k)) for k in range(4)] == [8, 12, 6, 1]
+    assert found.vertex_adjacency().sum() == 24
+
+
+@pytest.mark.parametrize("name", ["square", "cube", "triangle", "slice", "segment by two rows"])
+def test_every_simplex_of_a_triangulation_has_a_volume(name: str) -> None:
+    for simplex in CATALOGUE[name].triangulate():
+        edges = simplex[1:] - simplex[0]
+        assert np.linalg.matrix_rank(edges) == len(edges) == CATALOGUE[name].affine_dim()
