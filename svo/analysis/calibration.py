@@ -7,7 +7,7 @@ the sum of these costs is least. The program holds a whole trajectory, and what 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,12 +17,14 @@ from polytopes.shown import Shown
 from polytopes.signatures import options_by_name
 from svo.analysis.elastic_bounds import Bound, bounds_of
 from svo.analysis.elastic_program import ElasticProgram, Explained
+from svo.analysis.event_calibration import ContinuousPlant
 from svo.analysis.explanation import NEGLIGIBLE, explain
 from svo.analysis.nonlinear_calibration import WidenedPlant, half_widths
 from svo.analysis.trajectory import Trajectory
 from svo.checks import Array, bounded_box, expect, expect_shape, is_count
 from svo.logs.log import Log, expect_log
 from svo.models import NormalForm, UncertainModel, expect_model
+from svo.models.intervals import has_own_intervals
 from svo.models.nonlinear import NonlinearModel
 
 _MOST_RUNS = 50
@@ -118,7 +120,8 @@ def calibrate(
 
     A nonlinear model is calibrated on the linear models that a `WindowObserver` makes of it, remainders included, up to
     the sample that falsifies it; with the bounds that these need it is run again, until nothing is falsified. That is
-    sufficient: other bounds linearise the plant elsewhere, so no smallest widening is claimed.
+    sufficient: other bounds linearise the plant elsewhere, so no smallest widening is claimed. A linear model by
+    `UncertainModel.from_continuous` is calibrated in the same way on a log that keeps its own times.
 
     Raises
     ------
@@ -132,6 +135,8 @@ def calibrate(
     _check_log(model, log)
     if isinstance(model, NonlinearModel):
         return _until_consistent(model, log, initial, bounds, window)
+    if log.events or (log.keeps_its_times and has_own_intervals(model)):
+        return _at_own_times(ContinuousPlant.of(model), log, initial, bounds, window)
     form = NormalForm.at(model, *bounded_box("initial", initial, model.n_states))
     chosen = bounds_of(form, bounds)
     amounts = np.zeros(len(chosen))
@@ -191,6 +196,15 @@ def _until_consistent(
     return Calibration(widest, plant.chosen, plant.model, smallest=not widest)
 
 
+def _at_own_times(
+    plant: ContinuousPlant, log: Log, initial: HPolytope, bounds: Sequence[str], window: int
+) -> Calibration:
+    """By the equations of a linear plant, whose transitions take any time."""
+    found = _until_consistent(plant.equations(log), log, initial, bounds, window)
+    model = plant.widened({widening.bound: widening.amount for widening in found.widenings}, log, initial)
+    return replace(found, model=model)
+
+
 @dataclass(frozen=True)
 class _Piece:
     """A part of the log and its trajectory; ``before`` are the relative widenings that earlier parts need."""
@@ -245,8 +259,6 @@ def _check_log(model: UncertainModel | NonlinearModel, log: Log) -> None:
     if not isinstance(model, NonlinearModel):
         expect_model("model", model)
     expect_log(log)
-    if log.events and not isinstance(model, NonlinearModel):
-        raise ValueError("the log keeps its own times (Log.events); calibrate takes samples of the model's Ts")
     for name, count in (("u", model.n_inputs), ("y", model.n_outputs)):
         array = getattr(log, name)
         expect_shape(array.shape[1] == count, f"{name} of the log", array, f"({len(log)}, {count})")

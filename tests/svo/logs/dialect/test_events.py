@@ -11,13 +11,15 @@ import pytest
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
-from svo import detect, find_plant, read_log, verify
+from svo import UncertainModel, WindowObserver, detect, find_plant, read_log, verify
 from svo.analysis.calibration import calibrate
 from svo.cli import app
 from svo.detection.chains import PlantModels
+from svo.detection.log_calibration import calibrate_log
 from svo.detection.streamed import detect_streamed
 from svo.isolation.alarms import alarm_line, check_alarm
 from svo.logs.log import Log
+from svo.models.intervals import has_own_intervals
 from svo.plant.description import DescribedPlant, read_description
 from svo.plant.imported import import_log
 from svo.plant.long_log import survey_log
@@ -231,11 +233,36 @@ def test_an_imported_log_of_events_is_one(tmp_path: Path) -> None:
     assert survey.samples == len(log)
 
 
+@pytest.mark.parametrize(
+    ("bounds", "varying"),
+    [(("noise position", "noise speed"), ""), (("noise", "disturbances"), 'varying = "w"')],
+)
+def test_bounds_that_are_too_narrow_are_calibrated_on_events(
+    bounds: tuple[str, ...], varying: str, tmp_path: Path
+) -> None:
+    narrow = PLANT.replace("w = [0.1]", f"w = [0.02]\n{varying}").replace("n = [0.01, 0.05]", "n = [0.004, 0.02]")
+    the_plant = plant(tmp_path, FILES, narrow)
+    whole = read_log(folder_of(tmp_path / "run"), the_plant)
+    log = Log(whole.time[:25], whole.u[:25], whole.y[:25], events=True)
+    assert WindowObserver(the_plant.model, the_plant.initial).run(log).falsified_at is not None
+    found = calibrate(the_plant.model, log, the_plant.initial, bounds=bounds)
+    assert found.widenings
+    assert not found.smallest
+    assert {w.bound for w in found.widenings} <= set(found.chosen)
+    assert "falsified" not in WindowObserver(found.model, the_plant.initial).run(log).verdicts
+    assert has_own_intervals(found.model)
+    if not varying:
+        assert "A sufficient widening" in calibrate_log(the_plant, log, "stated").to_text()
+
+
 def test_what_takes_a_grid_only_says_so(tmp_path: Path) -> None:
     the_plant = plant(tmp_path, FILES)
     log = read_log(folder_of(tmp_path / "run"), the_plant)
-    with pytest.raises(ValueError, match="keeps its own times"):
-        calibrate(the_plant.model, log, the_plant.initial)
+    A, B, C = (the_plant.model.block(name) for name in "ABC")
+    with pytest.raises(ValueError, match=r"keeps its own times.*in discrete time"):
+        calibrate(UncertainModel(A, B, C, n=[0.01, 0.05], Ts=0.1), log, the_plant.initial)
+    with pytest.raises(ValueError, match="a Delta or a polytope"):
+        calibrate(the_plant.faults["motor"].model, log, the_plant.initial)
     with pytest.raises(ValueError, match='times = "events"'):
         detect(the_plant, Log(log.time, log.u, log.y))
     cart = find_plant(Path(__file__).parents[4] / "docs" / "examples" / "cart.toml")
