@@ -32,7 +32,10 @@ def verify(
     ] = None,
     write_proof: Annotated[
         Path | None,
-        typer.Option(metavar="PROOF.jsonl.gz", help="With --full: write every step of the proofs, for any checker."),
+        typer.Option(
+            metavar="PROOF.jsonl.gz",
+            help="With --full: write every step of the proofs, for any checker; an interrupted file is gone on with.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -48,15 +51,16 @@ def verify(
     """
     if log is not None and full is not None:
         raise ValueError("--log and --full were both given; --full LOG compares the data too, so leave --log out")
-    from svo.cli.progress import busy
+    from svo.cli.progress import busy, progress
 
-    if write_proof is not None:
-        if full is None:
-            raise ValueError("--write-proof was given without --full LOG, which makes the proof")
-        if write_proof.exists() or write_proof.is_symlink():
-            raise ValueError(f"{write_proof} exists already, and a proof never replaces a file; give another name")
-    with busy("Proving"):
-        found = face.verify(alarms, log or full, full=full is not None, write_proof=write_proof)
+    if write_proof is not None and full is None:
+        raise ValueError("--write-proof was given without --full LOG, which makes the proof")
+    if full is None:
+        with busy("Proving"):
+            found = face.verify(alarms, log)
+    else:
+        with progress("Proving alarms") as update:
+            found = face.verify(alarms, full, full=True, write_proof=write_proof, progress=update)
     if not found.checks:
         # Success would say that something was proven.
         raise ValueError(f"{alarms} holds no alarm, so there is nothing to prove: {_WHY_EMPTY}")

@@ -186,12 +186,18 @@ def with_chains(
     alarms: Sequence[Alarm],
     models: PlantModels,
     keep: Callable[[Chain], object] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[AlarmCheck]:
     """Checks of alarms that hold, each with what its proof from the model and the log is.
 
-    What holds is given to ``keep``, step by step.
+    What holds is given to ``keep``, step by step; ``progress`` is told how many alarms of how many are done.
     """
-    return [_with_chain(check, alarm, models, keep) for check, alarm in zip(checks, alarms, strict=True)]
+    found = []
+    for done, (check, alarm) in enumerate(zip(checks, alarms, strict=True), start=1):
+        found.append(_with_chain(check, alarm, models, keep))
+        if progress is not None:
+            progress(done, len(checks))
+    return found
 
 
 def _with_chain(

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from polytopes.shown import Shown, in_a_line
 from polytopes.signatures import options_by_name
 from svo.checks import expect_kind
 from svo.detection.chains import PlantModels, with_chains
 from svo.detection.found import Detection
-from svo.detection.proof_file import Chain
-from svo.detection.proof_file import write_proof as write_proof_file
+from svo.detection.proof_file import ProofFile
 from svo.isolation import NOT_CHECKED, Alarm, AlarmCheck, check_alarm, read_alarms, verify_alarms
 from svo.logs.log import Log
 from svo.plant import MonitoredPlant
@@ -101,6 +100,7 @@ def verify(
     full: bool = False,
     plant: MonitoredPlant | None = None,
     write_proof: str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Verification:
     """Check alarms: the digest of those stored, each proof in exact arithmetic, and data and model if the log is given.
 
@@ -118,7 +118,10 @@ def verify(
     plant : MonitoredPlant, optional
         The one that stored alarms are of; by default it is found by its name, a description beside them.
     write_proof : path, optional
-        With ``full``: every step of the proofs is written there, for checkers of others (`docs/proof_format.md`).
+        With ``full``: every step of the proofs is written there, for checkers of others (`docs/proof_format.md`), each
+        chain when it is proven. What an interrupted call has written is kept, if it is proven again.
+    progress : callable, optional
+        With ``full``: called with (alarms done, alarms in all) as they are done.
 
     Returns
     -------
@@ -139,21 +142,28 @@ def verify(
     expect_kind("alarms", alarms, (Detection, str, Path), "what svo.detect gives, or the path of an alarms.jsonl")
     if write_proof is not None and not full:
         raise ValueError("write_proof is given and full is not True; the steps of a proof come with it")
-    out = None if write_proof is None else Path(write_proof)
+    whole = _Whole(None if write_proof is None else Path(write_proof), progress) if full else None
     if not isinstance(alarms, Detection):
-        return _verified_file(Path(alarms), log, full, plant, out)
+        return _verified_file(Path(alarms), log, whole, plant)
     if log is not None or plant is not None:
         raise ValueError("log or plant is given beside a detection, which has its own; leave them out")
     models = PlantModels(alarms.plant, alarms.log)
     checks = [check_alarm(alarm, alarms.log, models.difference) for alarm in alarms.alarms]
     about = f"alarms of {alarms.log.source or 'the log'}"
-    return Verification(about, _completed(checks, alarms.alarms, models, full, out), "" if full else _START)
+    return Verification(about, _completed(checks, alarms.alarms, models, whole), "" if full else _START)
+
+
+class _Whole(NamedTuple):
+    """What is asked of whole proofs: the file they are written to, and who is told how far they are."""
+
+    out: Path | None
+    progress: Callable[[int, int], None] | None
 
 
 def _verified_file(
-    path: Path, log: Log | str | Path | None, full: bool, plant: MonitoredPlant | None, out: Path | None
+    path: Path, log: Log | str | Path | None, whole: _Whole | None, plant: MonitoredPlant | None
 ) -> Verification:
-    if log is None and full:
+    if log is None and whole is not None:
         raise ValueError("full is True and there is no log; give the log that the alarms are of")
     alarms = [] if log is None else _of_one_run(path)
     if log is None or not alarms:
@@ -162,22 +172,22 @@ def _verified_file(
     found = plant or find_plant(str(alarms[0].source.get("plant")), path.parent)
     data = log if isinstance(log, Log) else read_log(log, found)
     models = PlantModels(found, data)
-    checks = _completed(verify_alarms(path, data, models.difference), alarms, models, full, out)
-    return Verification(str(path), checks, "" if full else _START)
+    checks = _completed(verify_alarms(path, data, models.difference), alarms, models, whole)
+    return Verification(str(path), checks, "" if whole is not None else _START)
 
 
 def _completed(
-    checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: PlantModels, full: bool, out: Path | None
+    checks: Sequence[AlarmCheck], alarms: Sequence[Alarm], models: PlantModels, whole: _Whole | None
 ) -> tuple[AlarmCheck, ...]:
-    """The checks, with chains of bounds if all hold and these are asked for, which are then written."""
-    if not full or not all(check.ok for check in checks):
+    """The checks, with whole proofs if all hold and these are asked for, which are then written."""
+    if whole is None or not all(check.ok for check in checks):
         return tuple(checks)
-    chains: list[Chain] = []
-    found = with_chains(checks, alarms, models, None if out is None else chains.append)
+    out = ProofFile(whole.out, alarms[0].source) if whole.out is not None and alarms else None
+    found = with_chains(checks, alarms, models, None if out is None else out.add, whole.progress)
+    if whole.out is not None and (out is None or not out.chains):
+        raise ValueError(f"no proof can be written: {found[0].reason if found else 'there is no alarm'}")
     if out is not None:
-        if not chains:
-            raise ValueError(f"no proof can be written: {found[0].reason if found else 'there is no alarm'}")
-        write_proof_file(out, chains)
+        out.close()
     return tuple(found)
 
 

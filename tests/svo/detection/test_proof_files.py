@@ -19,7 +19,7 @@ from checkers import CHECK
 from proof_cases import CHECKER, Made, answer, proven, random_plant, steps_of, tiny, with_steps
 from typer.testing import CliRunner
 
-from svo import UncertainModel, Uncertainty, find_plant
+from svo import UncertainModel, Uncertainty, detect, find_plant, read_log, verify
 from svo.cli import app
 from svo.detection.plant_record import plant_record
 from tests.svo.observers.long_chains import long_chains
@@ -101,10 +101,40 @@ def test_the_commands_write_what_the_checker_takes(tmp_path: Path) -> None:
     code, text = answer(proof, plant, log)
     assert code == 0
     assert "2 of 2 alarms proven" in text
+    written = proof.read_bytes()
     again = run("verify", out / "alarms.jsonl", "--full", log, "--write-proof", proof)
-    assert again.exit_code == 1  # it exists
+    assert again.exit_code == 0  # and nothing is left to write
+    assert proof.read_bytes() == written
     assert run("verify", out / "alarms.jsonl", "--write-proof", tmp_path / "other.gz").exit_code == 1
     assert "without --full" in run("verify", out / "alarms.jsonl", "--write-proof", tmp_path / "other.gz").output
+
+
+def test_an_interrupted_proof_is_gone_on_with_and_nothing_in_it_is_believed(tmp_path: Path) -> None:
+    log, plant = CART.with_suffix(".csv"), find_plant(str(CART))
+    found, proof = detect(plant, read_log(log, plant)), tmp_path / "proof.jsonl.gz"
+    done: list[tuple[int, int]] = []
+
+    def stop(*at: int) -> None:
+        done.append((at[0], at[1]))
+        if at[0] == 1 and len(done) == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        verify(found, full=True, write_proof=proof, progress=stop)
+    assert len(of_kind(steps_of(proof), "alarm")) == 1
+    first = proof.read_bytes()
+    proof.write_bytes(first + gzip.compress(b"{")[:-3])  # the second chain was cut off as it was written
+    assert verify(found, full=True, write_proof=proof, progress=stop).ok
+    assert done == [(1, 2), (1, 2), (2, 2)]
+    assert proof.read_bytes().startswith(first)
+    assert len(of_kind(steps_of(proof), "alarm")) == 2
+    whole = steps_of(proof)
+    for content in (b"other", gzip.compress(b"{}\n"), first + gzip.compress(b'{"step": "alarm"}\n')):
+        (other := tmp_path / "other").write_bytes(content)
+        with pytest.raises(ValueError, match="give another name"):
+            verify(found, full=True, write_proof=other)
+        assert other.read_bytes() == content
+    assert steps_of(proof) == whole
 
 
 def test_a_scheduled_plant_is_described_with_its_log(tmp_path: Path) -> None:
