@@ -1,4 +1,4 @@
-"""A box that readings alone prove holds the state of the run, with every bound at a corner; the prover's are accepted."""
+"""A box that readings alone prove holds the state of the run, with every bound at a corner; so do the prover's."""
 
 from __future__ import annotations
 
