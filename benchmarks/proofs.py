@@ -101,8 +101,8 @@ def random_run(seed: int) -> dict[str, Any]:
 
 
 def _random_plant(rng: np.random.Generator) -> tuple[UncertainModel, Any]:
-    """Of one to three states, one or two outputs, and up to two uncertainties of any rank, with s of both signs."""
-    n, nw, ny = int(rng.integers(1, 4)), int(rng.integers(1, 3)), int(rng.integers(1, 3))
+    """Of one or two states and outputs, and up to two uncertainties of any rank, with s of both signs."""
+    n, nw, ny = int(rng.integers(1, 3)), int(rng.integers(1, 3)), int(rng.integers(1, 3))
     A = rng.normal(size=(n, n))
     A *= rng.choice([0.7, 0.9, 0.98]) / max(np.abs(np.linalg.eigvals(A)).max(), 0.1)
     items = [Uncertainty(A=0.1 * rng.normal(size=(n, n)), bounds=(-0.5, 0.5)) for _ in range(int(rng.integers(0, 3)))]
