@@ -13,4 +13,4 @@ drawn = {"P + Q": (P + Q, "#DDE7F3"), "P": (P, "#8FB3DC"), "P - Q": (P - Q, "#2A
 for name, (S, colour) in drawn.items():
     S.plot(ax, facecolor=colour, alpha=1.0, label=name)
 ax.set(aspect="equal")
-ax.legend()
+ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, fontsize=8)
