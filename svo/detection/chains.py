@@ -245,8 +245,9 @@ def _beginning(bank: Bank, alarm: Alarm, log: Log, first: ArrivalSet) -> tuple[i
 
     Only where the observer may have begun later than at the first sample, the bank is run over the log again.
     """
-    observer = bank.observers[alarm.observer]
-    if not bank.may_start_again and observer.model.start_range is None:
+    observer, proof = bank.observers[alarm.observer], _window_of(alarm)
+    rests_on_first = observer.model.start_range is None or (proof is not None and proof.largest_at is None)
+    if not bank.may_start_again and rests_on_first:
         return 0, Start("first", 0, first)
     step = next(verdict for verdict in drive(bank, log) if verdict.sample == alarm.sample).steps.get(alarm.observer)
     if step is None:
