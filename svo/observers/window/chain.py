@@ -20,9 +20,10 @@ from svo.logs.log import Log, expect_log
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.chain_starts import own_start
+from svo.observers.window.linearised_prover import LinearisedProver
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
-from svo.observers.window.prover import ChainProver
+from svo.observers.window.prover import ChainProver, ProvenChain
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,16 +86,15 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
     Raises
     ------
     TypeError
-        If the observer is no `WindowObserver`, or its model is nonlinear or has jitter. If the log is no `svo.Log`.
+        If the observer is no `WindowObserver`, or its model has jitter. If the log is no `svo.Log`.
     ValueError
         If a late measurement arrived after the log's end, or before it was taken; and as `WindowObserver.step` and
         `WindowObserver.late_update` do.
     """
     expect_kind("observer", observer, WindowObserver, "a WindowObserver, the only kind proven")
     expect_log(log)
-    if isinstance(observer.model, NonlinearModel) or observer.jitter is not None:
-        what = "jitter" if observer.jitter is not None else "a nonlinear model"
-        raise TypeError(f"the observer has {what}; a proof of its whole chain takes a linear model with exact stamps")
+    if observer.jitter is not None:
+        raise TypeError("the observer has jitter; a proof of its whole chain takes a model with exact stamps")
     begun = perf_counter()
     waiting = list(late)
     for i, measurement in enumerate(waiting):
@@ -114,10 +114,14 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
         if step.verdict == "falsified":
             at = k
             break
-    prover, found = None, None
+    found: ProvenChain | None = None
+    prover: ChainProver | LinearisedProver | None = None
     if at is not None:
-        of = ModelOnLog(again.model, first, replace(log, y=y))
-        prover = ChainProver(of, 0, own_start(of, 0, first, again.largest_at))
+        data, own = replace(log, y=y), own_start(again.model.start_range, 0, first, again.largest_at)
+        if isinstance(again.model, NonlinearModel):
+            prover = LinearisedProver(again.model, data, 0, own)
+        else:
+            prover = ChainProver(ModelOnLog(again.model, first, data), 0, own)
         found = prover.prove(at)
     return ChainCheck(
         proven=found is not None,

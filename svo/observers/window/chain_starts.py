@@ -20,6 +20,7 @@ import numpy as np
 from flint import arb, ctx
 
 from svo.checks import Array
+from svo.models.state_range import StateRange
 from svo.observers.free_start import balls, balls_up, left_inverse
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_model import ModelOnLog
@@ -74,12 +75,11 @@ class Start:
         return f"from {'the readings since ' if self.kind == 'readings' else ''}sample {self.sample}"
 
 
-def own_start(of: ModelOnLog, since: int, first: ArrivalSet, largest_at: int | None) -> Start:
+def own_start(largest: StateRange | None, since: int, first: ArrivalSet, largest_at: int | None) -> Start:
     """Where an observer began that was given a set at sample ``since`` of the log.
 
-    ``largest_at`` is the sample, counted from there, at which it began again from the model's largest set.
+    ``largest_at`` is the sample, counted from there, at which it began again from the model's ``largest`` set.
     """
-    largest = of.model.start_range
     if largest_at is not None and largest is not None:
         return Start("largest", since + largest_at, ArrivalSet.box(largest.lower, largest.upper))
     return Start("assumed" if since else "first", since, first)

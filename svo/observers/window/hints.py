@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from svo.checks import Array
@@ -10,27 +12,47 @@ from svo.models.nonlinear import NonlinearModel, Undecided
 from svo.models.state_range import within
 
 PARTS = 4096  # of a sample: what substeps are counted in
-_ROOM = (0.02, 0.1, 0.3, 1.0)  # of what a trajectory moves: what a box is larger by, in turn
-_MARGIN = 1e-3  # of that room: at least so much of it is left
+_ROOM = 0.005  # of what a trajectory moves: what a box is larger by at first
+_OTHERWISE = 0.03  # of what an end of the set moves within a substep: how much wider another's next one may begin
+_TRIALS = 12  # of ever larger boxes
+_MARGIN = 0.1  # of the room: at least so much of it is left
 _ROUNDED = 1e-13  # of the terms of a sum in floats: more than it rounds
 
 
-def hinted(model: NonlinearModel, before: Array, box: Array, u: Array, h: float) -> Array:
-    """A box (2, n) around ``box`` that the plant makes, within h from ``before`` on, a box in its interior of.
+def hinted(model: NonlinearModel, boxes: Array, u: Array, h: Sequence[float]) -> Array:
+    """Boxes (substeps, 2, n) around those of a path (`PlantKernel.path`) whose substeps take h seconds.
+
+    The plant makes of each, within that time, a box in its interior.
 
     Raises
     ------
     Undecided
-        If none of those that are tried is.
+        If one of them is not found.
     """
+    found, wider, last = [], np.zeros((2, model.n_states)), boxes[0, 0]
+    for (before, box), seconds in zip(boxes, h, strict=True):
+        wider = wider + _OTHERWISE * np.abs(before - last)
+        start = np.array(within(model.physical_range, before[0] - wider[0], before[1] + wider[1]))
+        found.append(_grown(model, start, box, u, seconds))
+        last = before
+    return np.array(found)
+
+
+def _grown(model: NonlinearModel, before: Array, box: Array, u: Array, h: float) -> Array:
+    """One of them."""
     wide = box[1] - box[0]
     moved = np.maximum(wide - (before[1] - before[0]), 0.0)
-    for share in _ROOM:
-        room = share * moved + 1e-9 * wide + 1e-13 * np.abs(box).max(axis=0) + 1e-200
-        found = np.array(within(model.physical_range, box[0] - room, box[1] + room))
-        image = _image(model, before, found, u, h)
-        if image is not None and _is_inside(model, image, found, _MARGIN * room):
-            return found
+    room = _ROOM * moved + 1e-9 * wide + 1e-13 * np.abs(box).max(axis=0) + 1e-200
+    image: Array | None = box
+    for trial in range(_TRIALS):
+        box = np.array(within(model.physical_range, box[0] - room, box[1] + room))
+        image = _image(model, before, box, u, h)
+        if image is None:
+            break
+        if _is_inside(model, image, box, _MARGIN * room):
+            return box
+        box = np.array([np.minimum(box[0], image[0]), np.maximum(box[1], image[1])])
+        room = room + 0.1 * trial * np.maximum(box[1] - box[0] - wide, 0.0)
     raise Undecided("no box was found that is plainly one that the state keeps to")
 
 

@@ -10,16 +10,18 @@ a checker finds them to contain what the plant makes of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 from typing import Any
 
 import numpy as np
 from flint import fmpq
 
-from polytopes.exact import ZERO, rational, rounded_up
+from polytopes.exact import ZERO, rational, rational_vector, rounded_up
 from svo.checks import Array
 from svo.logs.log import Log
 from svo.models import NormalForm
 from svo.models.nonlinear import Linearisation, LinearOutput, NonlinearModel, Span, Transition, Undecided
+from svo.models.state_range import within
 from svo.observers import window_kernel as kernel
 from svo.observers.given_units import arrival_in
 from svo.observers.window.certificate import WindowCertificate
@@ -34,9 +36,8 @@ from svo.observers.window.window import Window
 from svo.store.values import encode_value
 
 _EPS = 1e-9  # of the windows: their bounds are that much wider than what is proven of the model
-_WIDER = 1.0 / 16.0  # of a remainder: what it is stated larger by
+_WIDER = (1.0 / 16.0, 1.0 / 256.0)  # of a remainder: what it is stated larger by, and where no alarm follows
 _BLUNT, _WORTHWHILE, _ROUNDS = 1e-3, 0.8, 10  # of outputs, as in the core
-_ROUNDED = 1e-13  # of the terms of a sum in floats: more than it rounds
 _NARROWER = 0.01  # of a width: a bound that takes less off is not worth a step
 _HORIZON = 12  # samples of a window
 _NEAREST = 8  # samples before the alarm at which the first chain begins that knows the physical range alone
@@ -59,11 +60,16 @@ class LinearisedProver:
         self._model, self._log, self._since, self._begun = model, log, since, begun
         self.reason = "no set is known where it may begin"
 
+    @property
+    def unproven(self) -> tuple[str, ...]:
+        """Why the last claim was not proven."""
+        return (self.reason,)
+
     def prove(self, sample: int) -> ProvenChain | None:
         """The proof that no trajectory explains the readings up to a sample, or None; `reason` says why."""
-        for start in self._starts(sample):
+        for wider, start in product(_WIDER, list(self._starts(sample))):
             try:
-                return _Run(self._model, self._log, start).to(sample)
+                return _Run(self._model, self._log, start, wider).to(sample)
             except Undecided as error:
                 self.reason = str(error)
             except Outgrown:
@@ -83,9 +89,9 @@ class LinearisedProver:
 class _Run:
     """One chain from its start."""
 
-    def __init__(self, model: NonlinearModel, log: Log, start: Start) -> None:
+    def __init__(self, model: NonlinearModel, log: Log, start: Start, wider: float) -> None:
         carrier = model.carrier
-        self._model, self._log, self._start = model, log, start
+        self._model, self._log, self._start, self._wider = model, log, start, wider
         form = NormalForm.at(carrier, start.set.box_lower, start.set.box_upper)
         settings = WindowSettings(form, _HORIZON, np.zeros((0, model.n_states)), _EPS, 0)
         self._form, self._carrier = form, form.model
@@ -116,10 +122,7 @@ class _Run:
         return tuple(each for each in (self._start.premise, *stated) if each is not None)
 
     def _within(self, box: Span) -> Span:
-        physical = self._model.physical_range
-        if physical is None:
-            return box
-        return Span(np.maximum(box.lower, physical.lower), np.minimum(box.upper, physical.upper))
+        return Span(*(end.copy() for end in within(self._model.physical_range, *box)))
 
     # -- what a window is given ----------------------------------------------------------------------------
 
@@ -137,7 +140,7 @@ class _Run:
         model, before = self._model, np.full(self._model.n_outputs, np.inf)
         for _ in range(_ROUNDS):
             found = model.kernel.output(*self._known, self._log.u[k])
-            output = found._replace(R=found.R * (1.0 + _WIDER))
+            output = found._replace(R=found.R * (1.0 + self._wider))
             parts = zip("CcFR", output, strict=True)
             self._add("output", k, **{name: encode_value(part) for name, part in parts})
             blurs, narrower = _BLUNT * model.noise < found.R, _WORTHWHILE * before > found.R
@@ -222,14 +225,13 @@ class _Run:
         model, u = self._model, self._log.u[k]
         T = self._log.interval_at(k + 1) or model.Ts
         found = model.kernel.transition(*self._known, u, T)
-        R = found.R * (1.0 + _WIDER)
+        R = found.R * (1.0 + self._wider)
         more, after = {}, self._within(self._moved_by(found, R))
         if model.continuous:
             shares, boxes = model.kernel.path(*self._known, u, T, found.substeps)
-            each = zip(shares.tolist(), boxes, strict=True)
-            hints = np.array([hinted(model, before, box, u, T * share / PARTS) for share, (before, box) in each])
+            hints = hinted(model, boxes, u, (T / PARTS * shares).tolist())
             more = {"substeps": shares.tolist(), "boxes": encode_value(hints)}
-            after = Span(np.maximum(after.lower, hints[-1, 0]), np.minimum(after.upper, hints[-1, 1]))
+            after = Span(*within(model.valid_range, *np.clip(after, *hints[-1])))  # both hold what is enclosed
         parts = zip("AaER", (found.A, found.a, found.E, R), strict=True)
         self._add("transition", k, **{name: encode_value(part) for name, part in parts}, **more)
         moved = Linearisation.of(found.A, found.a, np.hstack([found.E, np.diag(R)]), at.C, at.c, at.F, at.n, at.nu)
@@ -237,12 +239,14 @@ class _Run:
         self._known = after
 
     def _moved_by(self, found: Transition, R: Array) -> Span:
-        """What the stated linear model makes of what is known."""
-        x, w = self._known, self._model.flow.w
-        middle = found.A @ (0.5 * (x.lower + x.upper)) + found.a + found.E @ (0.5 * (w.lower + w.upper))
-        spread = np.abs(found.A) @ (0.5 * x.width) + np.abs(found.E) @ (0.5 * w.width) + R
-        size = np.abs(found.A) @ x.largest + np.abs(found.a) + np.abs(found.E) @ w.largest + R
-        return Span(middle - spread - _ROUNDED * size, middle + spread + _ROUNDED * size)
+        """What the stated linear model makes of what is known: exactly, then rounded outward."""
+        ends = np.empty((2, len(R)))
+        for i, slopes in enumerate(np.hstack([found.A, found.E])):
+            for side, sign in enumerate((1, -1)):
+                x, w = np.split(sign * slopes, [len(R)])
+                least = _least(rational_vector(x), self._known) + _least(rational_vector(w), self._model.flow.w)
+                ends[side, i] = sign * -rounded_up(rational(R[i]) - sign * rational(found.a[i]) - least)
+        return Span(*ends)
 
     def _add(self, kind: str, k: int, **entries: Any) -> None:
         self._steps.append({"step": kind, "sample": k, **entries})

@@ -196,6 +196,7 @@ class WindowObserver(Observer):
         """An observer with these settings and first set, before its first sample."""
         again = copy(self)
         again._plan_for(self.model)
+        again._configure(self._settings)
         again._forget()
         again._begin(self._initial)
         return again

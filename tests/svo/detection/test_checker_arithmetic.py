@@ -125,8 +125,8 @@ def equations(model: NonlinearModel) -> Any:
 
 def path_of(model: NonlinearModel, lower: Any, upper: Any, u: Any, found: Any) -> dict[str, Any]:
     shares, boxes = model.kernel.path(lower, upper, u, model.Ts, found.substeps)
-    hints = [hinted(model, *pair, u, model.Ts * share / PARTS) for share, pair in zip(shares, boxes, strict=True)]
-    return {"substeps": shares.tolist(), "boxes": encode_value(np.array(hints))}
+    hints = hinted(model, boxes, u, (model.Ts / PARTS * shares).tolist())
+    return {"substeps": shares.tolist(), "boxes": encode_value(hints)}
 
 
 def left_out(line: Any, slopes: list[float], constant: float, box: list[Any]) -> float:

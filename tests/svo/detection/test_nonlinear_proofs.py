@@ -8,18 +8,25 @@ import sys
 from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from checkers import CHECK, FOLDER
 from proof_cases import Made, answer, proven, steps_of, with_steps
+from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 from polytopes import HPolytope
-from svo import ArchitectureI, NonlinearModel, WindowObserver, find_plant
+from svo import ArchitectureI, NonlinearModel, WindowObserver, find_plant, prove_chain
 from svo.cli import app
+from svo.detection.plant_record import observer_record
 from svo.logs.log import Log
+from svo.observers.window.chain_starts import own_start
+from svo.observers.window.linearised_prover import LinearisedProver
+from svo.observers.window.prover import ProvenChain
+from svo.store.values import encode_value
 from tests.svo.models.nonlinear_plants import CASES, Case
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
@@ -86,7 +93,12 @@ def test_the_second_file_is_short_and_needs_the_first_and_the_standard_library()
     assert names <= sys.stdlib_module_names | {"svo_check"}
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if name != "cstr"])
+LONG = ("lorenz", "tank", "crane")  # of the processor's time
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in CASES if n != "cstr"]
+)
 def test_alarms_of_nonlinear_plants_are_proven(name: str, tmp_path: Path) -> None:
     case = CASES[name]()
     files = proven(Nonlinear(case), run_of(case), tmp_path)
@@ -239,3 +251,85 @@ def test_a_proof_of_another_model_is_refused(reactor: Files, what: str) -> None:
             told["f"]["op"] = [12 if op == 9 else op for op in told["f"]["op"]]
 
     assert claims(changed(change, reactor)) == []
+
+
+# -- alarms that just are some, of models alone -----------------------------------------------------------------------
+
+
+def drifting(name: str, seed: int) -> tuple[WindowObserver, Log, int | None]:
+    """An observer, a log of which a sensor drifts, some readings missing, and the sample at which it is falsified."""
+    case, rng = CASES[name](), np.random.default_rng(seed)
+    log = case.model.simulate(case.x0, case.inputs(45), rng)
+    y, j = log.y.copy(), seed % log.y.shape[1]
+    y[15:, j] += case.model.noise[j] * rng.uniform(0.1, 0.5) * np.arange(30)
+    if seed % 3 == 0:
+        y[rng.random(y.shape) < 0.1] = np.nan
+    start = HPolytope.box(case.x0 - case.spread, case.x0 + case.spread)
+    observer, bad = WindowObserver(case.model, start, horizon=6), Log(log.time, log.u, y)
+    return observer, bad, observer.run(bad).falsified_at
+
+
+def is_checked(found: ProvenChain, observer: WindowObserver, log: Log, at: int, **plant: Any) -> bool:
+    """Whether the checker takes the steps of a chain."""
+    first = observer.first_set
+    assert first is not None
+    told = SimpleNamespace(u=log.u.tolist(), y=log.y.tolist(), time=log.time.tolist())
+    record = observer_record("made", first, observer.model, None)
+    chain = CHECK.linearised(record, {"Ts": float(observer.model.Ts).hex(), **plant}, told, at)
+    try:
+        for step in found.steps:
+            chain.take(json.loads(json.dumps(step)))
+    except CHECK.REFUSALS:
+        return False
+    return bool(found.steps[-1]["step"] == "alarm")
+
+
+def chain_of(observer: WindowObserver, log: Log, at: int) -> ProvenChain | None:
+    first = observer.first_set
+    assert first is not None
+    begun = own_start(observer.model.start_range, 0, first, observer.largest_at)
+    return LinearisedProver(observer.model, log, 0, begun).prove(at)
+
+
+# Of each, what was once not proven, or refused: wide sets, boxes of several substeps, an alarm that is just one.
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [("pendulum", 7), ("cstr", 10), ("three tanks", 3), ("crane", 2)]
+    + [pytest.param(name, seed, marks=pytest.mark.slow) for name in CASES for seed in range(20, 40)],
+)
+def test_a_drift_that_is_just_found_is_proven(name: str, seed: int) -> None:
+    observer, log, at = drifting(name, seed)
+    if at is None:
+        return
+    found = chain_of(observer, log, at)
+    assert found is not None
+    assert is_checked(found, observer, log, at)
+
+
+def test_a_chain_of_an_observer_alone_is_proven() -> None:
+    observer, log, at = drifting("pendulum", 7)
+    check = prove_chain(observer, log)
+    assert check.proven
+    assert check.falsified_at == at
+    assert check.given == ("the first set",)
+
+
+def test_samples_at_times_of_their_own_are_proven_by_these() -> None:
+    case, rng = CASES["pendulum"](), np.random.default_rng(2)
+    times = np.cumsum(rng.uniform(0.02, 0.08, 40))
+    x, rows = case.x0, []
+    for k in range(40):
+        rows.append(x)
+        rate = lambda _, x: case.model.flow.tape.values(np.concatenate([x, [0.02], [1.0]]))  # noqa: E731
+        x = solve_ivp(rate, (0.0, times[min(k + 1, 39)] - times[k]), x, rtol=1e-9).y[:, -1] if k < 39 else x
+    y = np.array(rows)[:, :1] + 0.002 * np.arange(40)[:, None]
+    log = Log(times, np.ones((40, 1)), y, events=True)
+    observer = WindowObserver(case.model, HPolytope.box(case.x0 - case.spread, case.x0 + case.spread), horizon=6)
+    at = observer.run(log).falsified_at
+    assert at is not None
+    found = chain_of(observer, log, at)
+    assert found is not None
+    intervals = np.diff(times)
+    assert is_checked(found, observer, log, at, intervals=encode_value(intervals))
+    assert not is_checked(found, observer, log, at, intervals=encode_value(1.1 * intervals))
+    assert not is_checked(found, observer, log, at)
