@@ -143,3 +143,11 @@ def test_unbounded_flat_and_empty_sets_that_inputs_keep() -> None:
     assert is_invariant(
         HPolytope([[-1.0, 0.0]], [0.0]), LinearSystem([[1.1, 0.0], [0.1, 1.0]], [[0.3], [0.0]], inputs=cube(1, 1.0))
     )
+
+
+@pytest.mark.parametrize("drift", [0.1, -0.1])
+def test_both_directions_of_a_line_are_asked_for_an_input(drift: float) -> None:
+    strip, start = HPolytope.box([-1.0, -np.inf], [1.0, np.inf]), HPolytope.box([0.0], [np.inf])
+    pushed = LinearSystem([[1.0, drift], [0.0, 1.0]], [[1.0], [0.0]], inputs=start)
+    assert not is_invariant(strip, pushed)
+    assert is_invariant(strip, LinearSystem(pushed.A, pushed.B, inputs=HPolytope.whole_space(1)))
