@@ -251,22 +251,6 @@ class Bank(Shown, ABC):
             observer.reset(set)
         self._forget()
 
-    def exchange(self, observers: Mapping[str, Observer]) -> None:
-        """Put other observers of the same models in the place of those of the same names, before the first sample.
-
-        Raises
-        ------
-        ValueError
-            If the bank has started, or has no observer of a name.
-        """
-        if self._sample is not None:
-            raise ValueError("exchange was called after the first sample; use a fresh bank")
-        for name in observers:
-            if name not in self.observers:
-                raise ValueError(f"the bank has no observer {name!r}; it has {', '.join(self.observers)}")
-        self.observers = MappingProxyType({**self.observers, **observers})
-        self._adopt(self._state)
-
     def warm_up(self) -> float:
         """Load whatever the observers' steps can need; returns the seconds that it took."""
         return sum(observer.warm_up() for observer in self.observers.values())

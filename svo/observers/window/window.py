@@ -1,6 +1,6 @@
 """A window: samples since a set of first states, and the programs that decide whether anything explains them.
 
-Observers drive it, and so do proofs from the first sample on: a window that has a `Prover` shows it every bound that it
+Observers drive it, and so do the chains of whole proofs: a window that has a `Prover` shows it every bound that it
 keeps. All in normal form.
 """
 
