@@ -20,8 +20,10 @@ import sys
 import time
 from pathlib import Path
 
-WORD = re.compile(r"-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf")
-MOST_UNPACKED, MOST_TIMES = 64 << 20, 50  # bytes; times the size of the file
+FLOAT = re.compile(r"(?:-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf)")
+FLOATS = re.compile(rf"(?:{FLOAT.pattern}(?: {FLOAT.pattern})*+)?")
+DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+MOST_UNPACKED, MOST_TIMES, MOST_SIZE = 1 << 19, 50, 1 << 10  # bytes; times the file's; states, inputs, ...
 LONGEST = 1 << (1 << 18)  # of a window's integers
 SIDES = {"upper": 1, "lower": -1}
 STARTS = {
@@ -32,13 +34,9 @@ STARTS = {
     "assumed": "the state is in a set that is ASSUMED at sample {0} (left by others' models): {1}",
 }
 READ_WITHIN = 1.125  # times the size of a box that readings prove: where they look for it
-NOTHING = {"shape": [0], "hex": ""}
 REFUSALS = Exception  # whatever goes wrong, nothing is proven
 TOLERANCE = 0.0100000001  # of the sampling time, by which the times of a log may differ from it
-
-
-class Wrong(ValueError):
-    pass
+Wrong = type("Wrong", (ValueError,), {})
 
 
 def expect(holds, why):
@@ -46,9 +44,7 @@ def expect(holds, why):
         raise Wrong(why)
 
 
-class Vec:
-    """Integers times 2^e; a number is a vector of one, and multiplies vectors."""
-
+class Vec:  # integers times 2^e; a number is a vector of one, and multiplies vectors
     def __init__(self, m, e=0):
         self.m, self.e = m, e
 
@@ -97,18 +93,17 @@ def up(value):
 
 
 def real(text):
-    expect(isinstance(text, str) and WORD.fullmatch(text), f"expected a float in hexadecimal, found {str(text)[:40]!r}")
+    expect(FLOAT.fullmatch(text), f"expected a float in hexadecimal, found {text[:40]!r}")
     return float.fromhex(text)
 
 
-def array(record, *shape):
-    """A nested list of floats; a None in the shape is any length."""
-    expect(isinstance(record, dict) and set(record) == {"shape", "hex"}, "expected an array")
+def array(record, *shape):  # a nested list of floats; a None in the shape is any length
     found, words = record["shape"], record["hex"]
-    expect(isinstance(found, list) and isinstance(words, str) and len(found) == len(shape), "expected an array")
+    expect(len(record) == 2 and isinstance(found, list) and len(found) == len(shape), "expected an array")
     fits = (type(n) is int and n >= 0 and want in (None, n) for n, want in zip(found, shape, strict=True))
     expect(all(fits), f"an array has shape {str(found)[:80]}; expected {list(shape)}")
-    values = [real(word) for word in words.split(" ")] if words else []
+    expect(FLOATS.fullmatch(words), f"expected floats in hexadecimal, found {words[:40]!r}")
+    values = [*map(float.fromhex, words.split(" "))] if words else []
     expect(math.prod(found) == len(values) and found[0] <= max(len(values), 1 << 16), "an array has other entries")
     for n in reversed(found[1:]):
         values = [values[i : i + n] for i in range(0, len(values), n)] if n else [[] for _ in range(found[0])]
@@ -126,25 +121,39 @@ def count(value, least=0, end=2**53):
     return value
 
 
-def lines_of(path):
-    """The lines of a file, packed or not, that are not blank."""
+def lines_of(path):  # of a file, packed or not, those that are not blank
     content = Path(path).read_bytes()
     most = max(MOST_UNPACKED, MOST_TIMES * len(content))
     if content[:2] == b"\x1f\x8b":
         content = gzip.GzipFile(fileobj=io.BytesIO(content)).read(most + 1)
-    expect(len(content) <= most, f"it unpacks to more than {most >> 20} MB")
+    expect(len(content) <= most, f"it unpacks to more than {most >> 10} kB")
     return (line for line in io.BytesIO(content) if line.strip())
+
+
+def once(pairs):
+    expect(len(dict(pairs)) == len(pairs), "an entry stands twice in an object")
+    return dict(pairs)
+
+
+def parsed(text):  # JSON that no two programs read differently
+    return json.loads(text.decode("ascii"), object_pairs_hook=once, parse_constant=real)
+
+
+def cell(text):
+    missing = text.strip(" ").lower() in ("", "nan")
+    expect(missing or DECIMAL.fullmatch(text.strip(" ")), f"expected a decimal in the log, found {text[:40]!r}")
+    return math.nan if missing else float(text)
 
 
 class Log:
     def __init__(self, path, columns):
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines(keepends=True)
-        if lines and not lines[-1].endswith(("\n", "\r")):
-            lines.pop()  # a line without its end is no sample
-        header, *rows = [row for row in csv.reader(lines) if row]
+        text = Path(path).read_text(encoding="utf-8-sig")
+        whole = io.StringIO(text[: text.rfind("\n") + 1], newline="")  # a line without its end is no sample
+        header, *rows = [row for row in csv.reader(whole, strict=True, skipinitialspace=True) if row]
         groups = [[columns["time"]], columns["inputs"], columns["outputs"]]
         expect(all(header.count(name) == 1 for g in groups for name in g), f"expected one column each of {groups}")
-        table = [[[float(row[header.index(c)].strip() or "nan") for c in group] for group in groups] for row in rows]
+        expect({*map(len, rows)} <= {len(header)}, "a row of the log has other cells than its header")
+        table = [[[cell(row[header.index(c)]) for c in group] for group in groups] for row in rows]
         self.time, self.u, self.y = [t for (t,), _, _ in table], [u for _, u, _ in table], [y for _, _, y in table]
 
     def check_times(self, last, Ts, intervals):
@@ -154,9 +163,7 @@ class Log:
             expect(near, f"samples {k} and {k + 1} are {dt:g} s apart, not {wanted:g}")
 
 
-class Set:
-    """{x : box[0] <= x <= box[1], ends[0] <= rows x <= ends[1]}."""
-
+class Set:  # {x : box[0] <= x <= box[1], ends[0] <= rows x <= ends[1]}
     def __init__(self, box, rows=(), ends=((), ())):
         self.box, self.rows, self.ends = box, rows, ends
 
@@ -171,11 +178,10 @@ class Set:
         return Set([[max(pair) for pair in pairs[0]], [min(pair) for pair in pairs[1]]], self.rows, self.ends)
 
 
-class Model:
-    """An observer's model: the numbers of plant.json alone, never those of a proof."""
-
+class Model:  # an observer's: the numbers of plant.json alone, never those of a proof
     def __init__(self, record):
-        n, nu, ny, nw = (count(record[key]) for key in ("n", "inputs", "outputs", "disturbances"))
+        keys = "n", "inputs", "outputs", "disturbances"
+        n, nu, ny, nw = (count(record[key], key in ("n", "outputs"), MOST_SIZE) for key in keys)
         self.n, self.nu, self.ny, self.rows, self.columns = n, nu, ny, n + ny, n + nu + 1 + nw
         self.delta = array(record["delta"], None, 2)
         given = record["matrices"]
@@ -209,8 +215,7 @@ class Model:
             self._known[k] = floats, rows, flat.e
         return self._known[k]
 
-    def _at(self, k):
-        """Linear interpolation, five operations in doubles; the nearest end beyond the points."""
+    def _at(self, k):  # linear interpolation, five operations in doubles; the nearest end beyond the points
         points, s = self._points, self._schedule[k]
         expect(math.isfinite(s), "a scheduling value is not finite")
         if s <= points[0] or s >= points[-1]:
@@ -221,9 +226,7 @@ class Model:
         return [[[(b - a) / step * beyond + a for a, b in zip(*rows, strict=True)] for rows in item] for item in pairs]
 
 
-class Chain:
-    """What follows, step by step, about one observer's model."""
-
+class Chain:  # what follows, step by step, about one observer's model
     def __init__(self, model, log, claimed):
         self.model, self.log, self.claimed, self.start, self.directions, self.checked = model, log, claimed, None, [], 0
         self.bounds, self.s, self.channels, self.premises = {}, {}, {}, []
@@ -268,13 +271,12 @@ class Chain:
         wide = [up(READ_WITHIN * size) for size in largest(*box)]
         self.start = k, Set([[-v for v in wide], wide])
         for i, rows in enumerate(array(step["inverse"], self.model.n, None, self.model.ny)):
-            window = {"first": k, "last": k + len(rows) - 1, "on_start": NOTHING}
+            window = {"first": k, "last": k + len(rows) - 1, "on_start": {"shape": [0], "hex": ""}}
             for end, side in zip(box, (-1, 1), strict=True):
                 self._bounded(window, end[i], k, self.directions[i], side, [[side * m for m in row] for row in rows])
         return Set(box)
 
-    def _set(self, k):
-        """What is proven of the state at a sample; infinite ends where nothing is."""
+    def _set(self, k):  # what is proven of the state at a sample; infinite ends where nothing is
         expect(self.start is not None and k >= self.start[0], "a step is about samples before its set starts")
         if k == self.start[0]:
             return self.start[1]
@@ -409,8 +411,7 @@ class Chain:
         expect(None not in s, f"s of a channel of sample {k} has no proven bounds")
         return self.model.delta[self.channels[k][0][q] - 1], s
 
-    def _reach(self, known, first, last):
-        """Bounds of |x|, |u|, 1, |w| at each sample of a window, in floats rounded up."""
+    def _reach(self, known, first, last):  # bounds of |x|, |u|, 1, |w| at each sample, in floats rounded up
         found, x, deltas = [], largest(*known.box), largest(*zip(*self.model.delta, strict=True))
         for k in range(first, last + 1):
             z = [*x, *map(abs, self.log.u[k]), 1.0, *largest(*self.model.bounds(k)[1:3])]
@@ -441,9 +442,8 @@ def linearised(*of):  # by the file beside this one
     return __import__("svo_check_nonlinear").Linearised(*of)
 
 
-def check(proof, plant, log):
-    """Observer, sample and chain of every alarm of a proof."""
-    steps = (json.loads(line) for line in lines_of(proof))
+def check(proof, plant, log):  # observer, sample and chain of every alarm of a proof
+    steps = map(parsed, lines_of(proof))
     head, chain, done = next(steps, {}), None, []
     wanted = {"format": "svo-proof-1", "plant": plant["plant"], "noise": plant["noise"]}
     expect(wanted.items() <= head.items(), f"the proof is not of {wanted}")
@@ -471,10 +471,10 @@ def main():
         parser.add_argument(name, **needed)
     given, begun = parser.parse_args(), time.process_time()
     try:
-        plant = json.loads(Path(at := given.model).read_text(encoding="utf-8"))
+        plant = parsed(Path(at := given.model).read_bytes())
         expect(plant.get("format") == "svo-plant-1", "the model is not of the format svo-plant-1")
         log = Log(at := given.log, plant["columns"])
-        expect(plant["samples"] in (None, len(log.time)), "the model's scheduling values are of another log")
+        expect(plant["samples"] is None or count(plant["samples"]) == len(log.time), "the model is of another log")
         found = check(at := given.proof, plant, log)
         intervals = array(plant["intervals"], len(log.time) - 1) if "intervals" in plant else None
         log.check_times(max(sample for _, sample, _ in found), real(plant["Ts"]), intervals)

@@ -18,7 +18,7 @@ from svo.checks import Array
 from svo.models.scheduled_stacks import ScheduledStacks
 from svo.observers.certificate import Certificate
 from svo.observers.proof_record import KINDS, WITHOUT_MATRICES, decode_proof, encode_proof, stacks_of
-from svo.store.values import check_keys, decode_array, decode_float, decode_integer, encode_value
+from svo.store.values import check_keys, decode_array, decode_float, decode_integer, encode_value, parse_once
 
 FORMAT, BEFORE = "svo-alarm-3", "svo-alarm-2"
 _ENTRIES = {"format", "kind", "observer", "sample", "time", "source", "certificate", "sha256"}
@@ -77,10 +77,10 @@ def alarm_line(alarm: Alarm) -> str:
     """
     record = _encode(alarm)
     record["sha256"] = digest_of_record(record)
-    return json.dumps(record, sort_keys=True) + "\n"
+    return json.dumps(record, sort_keys=True, allow_nan=False) + "\n"
 
 
-def read_record(text: str | bytes) -> Alarm:
+def read_record(text: str) -> Alarm:
     """The alarm of a line.
 
     Raises
@@ -88,7 +88,7 @@ def read_record(text: str | bytes) -> Alarm:
     BadRecord
     """
     try:
-        record = json.loads(text)
+        record = parse_once(text)
     except (ValueError, RecursionError) as error:
         raise BadRecord(f"not JSON ({error!s:.80})") from error
     known = isinstance(record, dict) and record.get("format") in (FORMAT, BEFORE)

@@ -18,7 +18,7 @@ LONGEST_LINE = 64 * 2**20
 _BLANK = b"\n" * 10_000
 _MAGIC = b"\x1f\x8b"
 _CHUNK = 2**16
-_AT_LEAST, _MOST_TIMES = 64 * 2**20, 50  # unpacked bytes: text packs 5 to 20 times, zeros a thousand
+_AT_LEAST, _MOST_TIMES = 4 * 2**20, 50  # unpacked bytes: text packs 5 to 20 times, zeros a thousand
 
 
 def packed(content: bytes) -> bytes:

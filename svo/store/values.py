@@ -5,6 +5,7 @@ A record is somebody's file: what is read has the exact type and shape that `enc
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -22,6 +23,28 @@ LARGEST_INTEGER = 2**53
 _ZERO = (0.0).hex()  # is written as 0
 _WORD = r"(?:-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf)"  # none is the beginning of a later one
 _FLOAT, _FLOATS = re.compile(_WORD), re.compile(rf"(?:{_WORD}(?: {_WORD})*+)?")
+
+
+def parse_once(text: str) -> Any:
+    """JSON that no two programs read differently: ASCII, no entry twice in an object, no NaN or Infinity.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    RecursionError
+        If it is nested too deeply.
+    """
+    if not text.isascii():
+        raise ValueError("it has other characters than ASCII")
+    return json.loads(text, object_pairs_hook=_once, parse_constant=decode_float)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table = dict(pairs)
+    if len(table) != len(pairs):
+        raise ValueError("an entry stands twice in an object")
+    return table
 
 
 def encode_value(value: Any) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import gzip
 import json
-import os
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -501,41 +500,6 @@ def test_ten_thousand_random_edits_prove_nothing_that_is_not_so(
 ) -> None:
     assert forge_at_random(case, range(10_000)) < 10_000
     assert forge_at_random(short_case, range(10_000)) < 10_000
-
-
-def bombs(steps: list[Any]) -> dict[str, bytes]:
-    lines = [json.dumps(step).encode() for step in steps]
-    begin, end = b"\n".join(lines[:3]) + b"\n", b"\n" + b"\n".join(lines[3:])
-    wide = {"step": "x", "sample": 0, "row": 0, "side": "upper", "value": "0", "first": 0, "last": 9}
-    shape = {"shape": [2**31, 0], "hex": ""}
-    return {
-        "digits": begin + b'{"step": "x", "sample": ' + b"9" * 10**6 + b"}" + end,
-        "nesting": begin + b"[" * 10**6 + end,
-        "shapes": begin + json.dumps(wide | {"on_start": shape, "on_output": shape}).encode() + end,
-        "template": begin + json.dumps(steps[2] | {"template": {"shape": [2**40, 1], "hex": ""}}).encode() + end,
-        "spaces": gzip.compress(b" " * 2**20) * 1000,
-        "blank lines": gzip.compress(b"\n" * 2**20) * 500,
-        "empty members": gzip.compress(b"") * 10**5,
-        "small members": gzip.compress(b" ") * 10**5,
-        "cut": gzip.compress(begin)[:-9],
-        "nothing": b"",
-    }
-
-
-def children_seconds() -> float:
-    """What processes that have ended took of the processor."""
-    used = os.times()
-    return used.children_user + used.children_system
-
-
-def test_bombs_end_soon_with_one_line(case: tuple[Files, int], tmp_path: Path) -> None:
-    (proof, plant, log), _ = case
-    for name, content in bombs(steps_of(proof)).items():
-        path = tmp_path / "bomb.jsonl.gz"
-        path.write_bytes(content)
-        begun = children_seconds()
-        assert claims((path, plant, log)) == [], name
-        assert children_seconds() - begun < 3.0, name  # of the processor, the start of Python in it; else one
 
 
 def test_what_cannot_be_written_is_refused_with_its_reason(tmp_path: Path) -> None:

@@ -186,7 +186,7 @@ def edit(seeds: range, tmp_path: Path) -> None:
 
 
 def test_random_edits_of_records_prove_nothing_that_is_not_so(tmp_path: Path) -> None:
-    edit(range(400), tmp_path)
+    edit(range(150), tmp_path)
 
 
 @pytest.mark.slow
