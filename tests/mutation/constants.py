@@ -203,6 +203,10 @@ CONSTANTS = (
     Constant("polytopes.ellipsoids", "_OPTIMAL", "heuristic"),
     Constant("svo.analysis.invariant_sets", "_INWARD", "heuristic"),
     Constant("svo.analysis.invariant_sets", "_SLACK", "heuristic"),
+    Constant("svo.observers.window.certificate", "_MOST_WORK", "heuristic"),
+    Constant("svo.observers.proof_record", "_MOST_SAMPLES", "heuristic"),
+    Constant("svo.isolation.alarm_record", "_MOST_ENTRIES", "heuristic"),
+    Constant("svo.store.packed_lines", "_MOST_TIMES", "heuristic"),
     Constant("polytopes.general_position", "WIDE", "heuristic"),
     Constant("polytopes.plotting", "_REACH", "heuristic"),
 )
