@@ -1,6 +1,7 @@
 """The operations of each library, from arrays to arrays: what its user types for a set ``A x <= b``.
 
-`METHODS[operation][library]` takes an `Instance`.  Answers are truth values, numbers, a box, rows ``[A, b]`` or points.
+`METHODS[operation][library]` takes an `Instance`.  Answers are truth values, numbers, a box,
+points, and rows ``[A, b]`` or a set that has them (`rows_of`).
 A library that is not installed has no methods.
 """
 
@@ -32,17 +33,16 @@ logging.getLogger("polytope").setLevel(logging.ERROR)  # it says which solver it
 CDD, PPL, POLYTOPE = library("cdd"), library("ppl"), library("polytope")
 
 
+def rows_of(answer: Answer) -> Floats:
+    """Rows ``[A, b]`` of a set of ours (an equality as two) or of polytope's; others give such rows."""
+    if isinstance(answer, np.ndarray):
+        return answer
+    if isinstance(answer, HPolytope):
+        answer = answer.intersection(HPolytope(np.vstack([answer.C, -answer.C]), np.append(answer.d, -answer.d)))
+    return np.hstack([answer.A, np.reshape(answer.b, (-1, 1))])
+
+
 # ours
-
-
-def rows_of(P: HPolytope) -> Floats:
-    """Rows ``[A, b]``, an equality as two."""
-    return np.vstack([np.hstack([A, b[:, None]]) for A, b in ((P.A, P.b), (P.C, P.d), (-P.C, -P.d))])
-
-
-def pair(case: Instance) -> tuple[HPolytope, HPolytope]:
-    """Both sets."""
-    return HPolytope(case.A, case.b), HPolytope(case.A2, case.b2)
 
 
 def kept(case: Instance) -> range:
@@ -55,18 +55,18 @@ OURS: dict[str, Method] = {
     "support": lambda s: HPolytope(s.A, s.b).support(s.c),
     "bounding box": lambda s: HPolytope(s.A, s.b).bounding_box(),
     "largest ball": lambda s: HPolytope(s.A, s.b).chebyshev().radius,
-    "redundancy": lambda s: rows_of(HPolytope(s.A, s.b).remove_redundancy()),
+    "redundancy": lambda s: HPolytope(s.A, s.b).remove_redundancy(),
     "vertices": lambda s: HPolytope(s.A, s.b).vertices(),
-    "rows to vertices to rows": lambda s: rows_of(HPolytope.from_vertices(HPolytope(s.A, s.b).vertices())),
-    "hull of points": lambda s: rows_of(HPolytope.from_vertices(s.V)),
-    "hull of a union": lambda s: rows_of(convex_hull(list(pair(s)))),
-    "projection": lambda s: rows_of(HPolytope(s.A, s.b).project(kept(s))),
-    "Minkowski sum": lambda s: rows_of(pair(s)[0].minkowski_sum(pair(s)[1])),
-    "Pontryagin difference": lambda s: rows_of(pair(s)[0].pontryagin_difference(pair(s)[1])),
+    "rows to vertices to rows": lambda s: HPolytope.from_vertices(HPolytope(s.A, s.b).vertices()),
+    "hull of points": lambda s: HPolytope.from_vertices(s.V),
+    "hull of a union": lambda s: convex_hull([HPolytope(s.A, s.b), HPolytope(s.A2, s.b2)]),
+    "projection": lambda s: HPolytope(s.A, s.b).project(kept(s)),
+    "Minkowski sum": lambda s: HPolytope(s.A, s.b).minkowski_sum(HPolytope(s.A2, s.b2)),
+    "Pontryagin difference": lambda s: HPolytope(s.A, s.b).pontryagin_difference(HPolytope(s.A2, s.b2)),
     "volume": lambda s: HPolytope(s.A, s.b).volume(),
-    "contains a set": lambda s: bool(pair(s)[0].contains(pair(s)[1])),
-    "equality": lambda s: pair(s)[0] == HPolytope(s.A[::-1], s.b[::-1]),
-    "intersection not empty": lambda s: bool(pair(s)[0].intersects(pair(s)[1])),
+    "contains a set": lambda s: bool(HPolytope(s.A, s.b).contains(HPolytope(s.A2, s.b2))),
+    "equality": lambda s: HPolytope(s.A, s.b) == HPolytope(s.A[::-1], s.b[::-1]),
+    "intersection not empty": lambda s: bool(HPolytope(s.A, s.b).intersects(HPolytope(s.A2, s.b2))),
 }
 
 
@@ -346,10 +346,6 @@ def tulip(A: Floats, b: Floats) -> Any:
     return POLYTOPE.Polytope(A, b)
 
 
-def tulip_rows(P: Any) -> Floats:
-    return np.hstack([P.A, np.reshape(P.b, (-1, 1))])
-
-
 def tulip_corners(A: Floats, b: Floats) -> Floats:
     return POLYTOPE.extreme(tulip(A, b))
 
@@ -358,15 +354,13 @@ TULIP: dict[str, Method] = {
     "emptiness": lambda s: POLYTOPE.is_empty(tulip(s.A, s.b)),
     "bounding box": lambda s: tuple(np.ravel(v) for v in POLYTOPE.bounding_box(tulip(s.A, s.b))),
     "largest ball": lambda s: float(POLYTOPE.cheby_ball(tulip(s.A, s.b))[0]),
-    "redundancy": lambda s: tulip_rows(POLYTOPE.reduce(tulip(s.A, s.b))),
+    "redundancy": lambda s: POLYTOPE.reduce(tulip(s.A, s.b)),
     "vertices": lambda s: tulip_corners(s.A, s.b),
-    "rows to vertices to rows": lambda s: tulip_rows(POLYTOPE.qhull(tulip_corners(s.A, s.b))),
-    "hull of points": lambda s: tulip_rows(POLYTOPE.qhull(s.V)),
-    "hull of a union": lambda s: tulip_rows(
-        POLYTOPE.qhull(np.vstack([tulip_corners(s.A, s.b), tulip_corners(s.A2, s.b2)]))
-    ),
-    "projection": lambda s: tulip_rows(POLYTOPE.projection(tulip(s.A, s.b), np.array(kept(s)) + 1)),
-    "Minkowski sum": lambda s: tulip_rows(POLYTOPE.qhull(sums(tulip_corners(s.A, s.b), tulip_corners(s.A2, s.b2)))),
+    "rows to vertices to rows": lambda s: POLYTOPE.qhull(tulip_corners(s.A, s.b)),
+    "hull of points": lambda s: POLYTOPE.qhull(s.V),
+    "hull of a union": lambda s: POLYTOPE.qhull(np.vstack([tulip_corners(s.A, s.b), tulip_corners(s.A2, s.b2)])),
+    "projection": lambda s: POLYTOPE.projection(tulip(s.A, s.b), np.array(kept(s)) + 1),
+    "Minkowski sum": lambda s: POLYTOPE.qhull(sums(tulip_corners(s.A, s.b), tulip_corners(s.A2, s.b2))),
     "volume": lambda s: float(POLYTOPE.volume(tulip(s.A, s.b))),
     "contains a set": lambda s: POLYTOPE.is_subset(tulip(s.A2, s.b2), tulip(s.A, s.b)),
     "equality": lambda s: tulip(s.A, s.b) == tulip(s.A[::-1], s.b[::-1]),

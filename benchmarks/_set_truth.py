@@ -86,7 +86,8 @@ def _rows(truth: Any, minimal: bool = True) -> Verdict:
     centre, width = V.mean(axis=0), np.ptp(V, axis=0)
     V, facets = (V - centre) / width, _scaled(peers.ppl_table(truth), centre, width)
 
-    def right(rows: Floats) -> bool:
+    def right(answer: Any) -> bool:
+        rows = peers.rows_of(answer)
         if not len(rows) or not np.isfinite(rows).all() or (minimal and len(rows) > len(facets)):
             return False
         found = _scaled(rows, centre, width)

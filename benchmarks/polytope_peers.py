@@ -31,7 +31,7 @@ from benchmarks._set_instances import Instance
 from benchmarks._set_truth import judge
 
 OUT = Path("build/benchmarks")
-TURNS, TURN_NS, LONGEST_NS = 9, 2_000_000, 4_000_000_000  # of a method: turns, least time of one, most of all
+TURNS, TURN_NS, LONGEST_NS = 7, 2_000_000, 600_000_000  # of a method: turns, least time of one, most of all
 LARGE = {
     "26 rows in R^3": ("vertices", "Minkowski sum"),
     "36 rows in R^3": ("rows to vertices to rows", "hull of a union"),
@@ -122,10 +122,31 @@ def columns() -> list[str]:
 
 
 def as_markdown(done: list[Line]) -> str:
-    """The table of the page."""
-    head = columns()
-    body = ["| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *map(row, done))]
-    return "\n".join(body) + "\n"
+    """The tables of the page: operations by instances, our time and the ratio; then the large instances, all times."""
+    by_place = {(line["operation"], line["instance"]): line for line in done}
+    groups = [[*instances.small(), *instances.decimal()], [*instances.degenerate(), *instances.uneven()]]
+    tables = []
+    for group in groups:
+        names = [case.name for case in group]
+        body = [[operation, *(cell(by_place.get((operation, name))) for name in names)] for operation in peers.OURS]
+        tables.append(markdown(["operation", *names], body))
+    tables.append(markdown(columns(), [row(line) for line in done if line["instance"] in LARGE]))
+    return "\n".join(tables)
+
+
+def cell(line: Line | None) -> str:
+    """Our microseconds, the ratio and the initial of the peer, and the peers that are wrong."""
+    if line is None:
+        return ""
+    quotient = ratio(line)
+    wrong = "".join(name[0] for name, time in line["microseconds"].items() if isinstance(time, str))
+    parts = [shown(line["microseconds"]["ours"]), "" if quotient is None else f"{quotient[0]:.2g} {quotient[1][0]}"]
+    return ", ".join(part for part in [*parts, f"wrong: {wrong}" if wrong else ""] if part)
+
+
+def markdown(head: list[str], body: list[list[str]]) -> str:
+    """A table."""
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *body)) + "\n"
 
 
 def summary(done: list[Line]) -> str:

@@ -4,6 +4,7 @@ Bounds are quotients, rounded outward by less than one unit of the last place wh
 sums of products in twice the working precision, rounded up.
 """
 
+from itertools import product
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -12,12 +13,14 @@ from polytopes.checks import Floats
 from polytopes.native import Address, Entries, Integer, function
 from polytopes.rounding import check_rounding
 
+_COORDINATES = 16  # with more, vertices are too many
+
 _box = function("fdi_box", *[Integer] * 2, *[Address] * 2, Entries, returns=Integer)
 _supports = function("fdi_box_supports", *[Integer] * 2, *[Address] * 2, Entries, returns=Integer)
 
 
 class Box(NamedTuple):
-    """A box that is not empty: its corners and its point are the first rows of an array."""
+    """A box that is not empty: its corners, its point, and its corners rounded inward are the rows of an array."""
 
     found: Floats
 
@@ -42,6 +45,20 @@ class Box(NamedTuple):
         return cls(found) if _box(m, n, A.tobytes(), b.tobytes(), found) else None
 
     @property
+    def exact(self) -> bool:
+        """Whether it is bounded and full-dimensional, and nothing in its corners was rounded."""
+        (lower, upper), inner = self.corners, self.found[3:]
+        return bool((lower < upper).all() and (self.corners == inner).all() and self.bounded)
+
+    @property
+    def vertices(self) -> Floats | None:
+        """Its vertices (k, n) in lexicographic order; None if it is unbounded, one was rounded, or they are many."""
+        if self.point.size > _COORDINATES or not (self.corners == self.found[3:]).all() or not self.bounded:
+            return None
+        ends = [(u, v) if u < v else (u,) for u, v in self.corners.T.tolist()]
+        return np.array(list(product(*ends)))
+
+    @property
     def bounded(self) -> bool:
         return np.count_nonzero(np.isfinite(self.corners)) == 2 * self.point.size
 
@@ -51,3 +68,9 @@ class Box(NamedTuple):
         k, n = directions.shape
         values = np.empty(k)
         return values if _supports(n, k, self.found.tobytes(), directions.tobytes(), values) else None
+
+
+def box_rows(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Rows A (2 n, n) and b (2 n,) of a bounded box."""
+    axes = np.eye(lower.size)
+    return np.concatenate([axes, -axes]), np.concatenate([upper, -lower])

@@ -49,6 +49,8 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
     """
     if not known_nonempty(Q):
         return Containment(True)
+    if _surely_within(P, Q):
+        return Containment(True)
     normals, sides = evened(*half_spaces(P))
     sizes = lengths(normals)
     beyond = _supports(Q, normals) - sides
@@ -60,6 +62,12 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
     i = int(np.argmax(excess))
     row = i if i < P.b.size + P.d.size else i - P.d.size
     return Containment(False, _beyond(Q, normals[i], float(sides[i]), tol), row, float(excess[i]))
+
+
+def _surely_within(P: Rows, Q: Rows) -> bool:
+    """Whether upper bounds of the supports of Q prove, without a tolerance, that it lies in P."""
+    values = None if Q.prepared is None or P.d.size else Q.prepared.supports(P.A)
+    return values is not None and bool((values <= P.b).all())
 
 
 def _supports(Q: Rows, normals: Floats) -> Floats:

@@ -18,7 +18,7 @@ from polytopes.integers import floats_of_directions, floats_of_points, integer_r
 from polytopes.kept_vertices import among
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of, rows_of
 from polytopes.outward import are_exact, float_rows
-from polytopes.rows import Rows, Table
+from polytopes.rows import Rows, Table, no_equalities
 from polytopes.short_sets import short_hull
 from polytopes.shown import Shown
 from polytopes.support import is_bounded, known_nonempty
@@ -113,8 +113,11 @@ def rows_of_fractions(V: Any, rays: Any) -> Table:
 
 def exact_hull(V: Floats) -> Table | None:
     """Rows A, b, C, d of the hull of points (k, n) of few bits that span the space, exact; else None."""
-    rows = short_hull(V) if short_vector([*V[0].tolist(), 1.0]) else None
-    return None if rows is None else (rows[:, :-1], rows[:, -1], np.empty((0, V.shape[1])), np.empty(0))
+    return _table(short_hull(V))
+
+
+def _table(rows: Floats | None) -> Table | None:
+    return None if rows is None else (rows[:, :-1], rows[:, -1], *no_equalities(rows.shape[1] - 1))
 
 
 def rows_of_generators(V: Floats, rays: Floats) -> Table:
@@ -128,17 +131,21 @@ def hull_and_vertices(V: Floats, rays: Floats) -> tuple[Table, Callable[[], Exac
     In integers where the numbers are short, where there are rays, and where the points are flat; the rows are exact if
     they are floats, and outward else.
     """
-    known = None if len(rays) else exact_hull(V)
+    few_bits = short_vector([*V[0].tolist(), 1.0])
+    known = exact_hull(V) if few_bits and not len(rays) else None
     if known is not None:
         return known, lambda: among(distinct(integer_rows(np.hstack([V, np.ones((len(V), 1))]))), integer_form(*known))
     unit = _unit(V)
     if unit:
         A, b, C, d = rows_of_generators(np.ldexp(V, -unit), rays)
         return (A, np.ldexp(b, unit), C, np.ldexp(d, unit)), None
-    points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
-    around = None if len(rays) or short(points) else rows_around(V)
+    around = None if few_bits or len(rays) else _table(rows_around(V))
     if around is not None:
-        return (around[:, :-1], around[:, -1], np.empty((0, V.shape[1])), np.empty(0)), None
+        return around, None
+    points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
+    around = None if len(rays) or short(points) else _table(rows_around(V))
+    if around is not None:
+        return around, None
     directions = integer_rows(rays[rays.any(axis=1)])
     exact = short(points) or len(directions) > 0
     spread = None if exact else Spread.of(V)

@@ -19,6 +19,8 @@ SHORT = 2**32
 _LARGE = 32  # bits
 _BITS = 53  # of a float
 _EXACT = 2.0**_BITS
+_HALF_EXACT = 2.0**26
+_PARTS = 2.0**13
 _FARTHEST = 1000  # powers of two that a float may be multiplied by
 
 
@@ -81,6 +83,12 @@ def exact_product(A: Floats, M: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     with np.errstate(over="ignore"):
         limit = np.ldexp(_EXACT, rows[:, None] + columns[None])
     return A @ M, np.abs(A) @ np.abs(M) <= limit
+
+
+def whole(table: Floats, terms: int) -> bool:
+    """Whether entries are so small multiples of 2^-13 that sums of so many of their products with others are floats."""
+    parts = table * _PARTS
+    return bool(np.abs(parts).max(initial=0.0) * terms < _HALF_EXACT and (parts == np.rint(parts)).all())
 
 
 def rounded_difference(first: Floats, second: Floats, difference: Floats) -> Floats:

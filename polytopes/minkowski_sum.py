@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from polytopes.box import box_rows
 from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError
 from polytopes.general_position import rows_around
@@ -12,7 +13,7 @@ from polytopes.minkowski_weyl import total
 from polytopes.outer_supports import upper_supports
 from polytopes.outward import float_rows
 from polytopes.projection import project
-from polytopes.rows import Rows, Table, nothing
+from polytopes.rows import Rows, Table, no_equalities, nothing
 from polytopes.short_sets import Corners
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import quick_vertices, vertices
@@ -35,11 +36,11 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
     UndecidedError
         If a set is unbounded and the double description of it or of the sum too large.
     """
-    if not (known_nonempty(P) and known_nonempty(Q)):
-        return nothing(P.dim)
-    known = _of_exact_corners(P.corners, Q.corners)
+    known = _of_boxes(P, Q) or _of_exact_corners(P.corners, Q.corners)
     if known is not None:
         return known
+    if not (known_nonempty(P) and known_nonempty(Q)):
+        return nothing(P.dim)
     first, second = P.exact, Q.exact
     if first is not None and second is not None and len(first.vertices) * len(second.vertices) <= _MAX_SUMS:
         return float_rows(total(first, second))
@@ -48,6 +49,16 @@ def minkowski_sum(P: Rows, Q: Rows) -> Table:
     normals = _normals(P, Q)
     supports = upper_supports(P, normals) + upper_supports(Q, normals)
     return normals, np.nextafter(supports, np.inf), np.empty((0, P.dim)), np.empty(0)
+
+
+def _of_boxes(P: Rows, Q: Rows) -> Table | None:
+    """The sum of two boxes whose corners add up without rounding; None if they are not such."""
+    if P.as_box is None or Q.as_box is None or not (P.as_box.exact and Q.as_box.exact):
+        return None
+    first, second = P.as_box.corners, Q.as_box.corners
+    sums = first + second
+    rounded = rounded_difference(first, -second, sums).any()
+    return None if rounded else (*box_rows(*sums), *no_equalities(P.dim))
 
 
 def _of_exact_corners(V: Corners | None, W: Corners | None) -> Table | None:

@@ -39,6 +39,9 @@ def upper_supports(P: Rows, directions: Floats, uncertain: Floats | None = None)
     UndecidedError
         If a support could not be found.
     """
+    of_box = None if uncertain is not None or P.as_box is None else P.as_box.supports(directions)
+    if of_box is not None:
+        return of_box
     if uncertain is None and P.exact is not None:
         return np.array([up(support_of(P.exact, row)) for row in directions])
     best = maxima(P, directions)

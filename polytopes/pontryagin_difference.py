@@ -8,7 +8,7 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.exact_sides import with_sides
-from polytopes.integers import exact_product, is_short, rounded_difference
+from polytopes.integers import exact_product, rounded_difference, whole
 from polytopes.linear_program import Program
 from polytopes.outer_supports import exact_supports, lower_supports
 from polytopes.rows import Rows, Table, everything, nothing
@@ -37,7 +37,7 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
         return everything(P.dim)
     if not np.isfinite(result.values).all() or (P.C.any() and Q.wide):
         return nothing(P.dim)
-    short = is_short(P.A, P.b, P.C, P.d) and is_short(Q.A, Q.b, Q.C, Q.d)
+    short = P.short and Q.short
     near = None
     if not short and Q.wide:
         near = P.A, np.nextafter(P.b - lower_supports(Q, P.A), np.inf), P.C, P.d
@@ -56,9 +56,13 @@ def _by_exact_corners(P: Rows, Q: Rows) -> Table | None:
     """The rows moved inward, where the vertices of Q, its supports and what is left are floats; None if not."""
     if P.d.size or Q.corners is None or not Q.corners.exact:
         return None
-    values, certain = exact_product(P.A, Q.corners.points.T)
-    if not certain.all():
-        return None
+    V = Q.corners.points
+    if not (whole(P.A, P.dim) and whole(V, P.dim)):
+        values, certain = exact_product(P.A, V.T)
+        if not certain.all():
+            return None
+    else:
+        values = P.A @ V.T
     supports = values.max(axis=1)
     sides = P.b - supports
     return None if rounded_difference(P.b, supports, sides).any() else (P.A, sides, P.C, P.d)

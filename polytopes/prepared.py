@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polytopes.affine import AffineSet, affine_set
 from polytopes.checks import Floats
@@ -32,9 +33,10 @@ _ball = function("fdi_prepared_ball", *[Integer] * 2, Given, Entries, *[Real] * 
 _supports = function(
     "fdi_prepared_supports", *[Integer] * 3, Entries, Given, *[Real] * 2, Entries, *[Address] * 3, returns=Integer
 )
-_size, _room, _ball_room = (
+_facets = function("fdi_prepared_facets", *[Integer] * 2, *[Entries] * 3, Address, returns=Integer)
+_size, _room, _ball_room, _facets_room = (
     lru_cache(1024)(function(f"fdi_prepared{name}", *[Integer] * 2, returns=Integer))
-    for name in ("_size", "_room", "_ball_room")
+    for name in ("_size", "_room", "_ball_room", "_facets_room")
 )
 _supports_room = lru_cache(1024)(function("fdi_prepared_supports_room", *[Integer] * 3, returns=Integer))
 
@@ -89,6 +91,13 @@ class PreparedRows(NamedTuple):
         settled = _ball(n, m, self.A, self.block, WIDEST, CLEAN, found, scratch(_ball_room(n, m)))
         return (found[:n], found.item(n)) if settled else None
 
+    def facets(self) -> NDArray[np.int64] | None:
+        """Numbers of a minimal set of the rows; None if rounding leaves one open."""
+        m, n = self.A.shape
+        rows, doubtful = np.empty((2, m), np.int64)
+        count = _facets(n, m, self.block, rows, doubtful, scratch(_facets_room(n, m)))
+        return None if np.count_nonzero(doubtful[:count]) else rows[:count]
+
     def program(self) -> Program:
         """The rows as a program, its largest ball known."""
         m, n = self.A.shape
@@ -103,8 +112,11 @@ class PreparedRows(NamedTuple):
     def _parts(self) -> list[Floats]:
         """Head, AT, rhs, norms, centre, multipliers, reach, exponents of columns and of rows, as the core has them."""
         m, n = self.A.shape
-        sizes = (2, n * m, m, m, n + 1, m, n, n, m)
-        return np.split(self.block, np.cumsum(sizes))[:-1]
+        parts, end = [], 0
+        for size in (2, n * m, m, m, n + 1, m, n, n, m):
+            parts.append(self.block[end : end + size])
+            end += size
+        return parts
 
 
 @lru_cache(64)

@@ -22,6 +22,7 @@ from flint import fmpq
 
 from polytopes.affine import AffineSet, affine_set
 from polytopes.affine_hull import explicit
+from polytopes.box import box_rows
 from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
@@ -33,7 +34,7 @@ from polytopes.minkowski_weyl import shadow
 from polytopes.outer_supports import upper_supports
 from polytopes.outer_template import outer_template
 from polytopes.outward import float_rows
-from polytopes.rows import Rows
+from polytopes.rows import Rows, Table, no_equalities
 from polytopes.support import known_nonempty, maxima
 from polytopes.vertices import vertices
 
@@ -71,13 +72,11 @@ def project(
         If P is unbounded and the method needs vertices.
     """
     n, k = P.dim, len(keep)
+    known = _shadow_of_corners(P, list(keep)) if method == "auto" else None
+    if known is not None:
+        return known
     if not known_nonempty(P):
         return np.zeros((1, k)), np.array([-1.0]), np.empty((0, k)), np.empty(0)
-    corners = P.corners if method == "auto" else None
-    if corners is not None and corners.exact and len(corners.points) <= _FEW_CORNERS:
-        known = exact_hull(corners.points[:, list(keep)])
-        if known is not None:
-            return known
     few = few_generators(P.A, P.b, P.C, P.d, P.program) if method == "auto" else None
     if few is not None:
         return float_rows(shadow(few, list(keep)))
@@ -102,6 +101,15 @@ def project(
         A = np.zeros((b.size, k))
         A[:, [list(keep).index(j) for j in free]] = reduced
     return A, b, C, d
+
+
+def _shadow_of_corners(P: Rows, keep: list[int]) -> Table | None:
+    """The shadow of a box, or the hull of projected vertices that are few and floats of few bits; None if neither."""
+    if P.as_box is not None and P.as_box.exact:
+        lower, upper = P.as_box.corners[:, keep]
+        return *box_rows(lower, upper), *no_equalities(len(keep))
+    few = P.corners is not None and P.corners.exact and len(P.corners.points) <= _FEW_CORNERS
+    return exact_hull(P.corners.points[:, keep]) if few and P.corners is not None else None
 
 
 def _equalities_left(flat: AffineSet, keep: Sequence[int]) -> tuple[Floats, Floats]:

@@ -66,7 +66,8 @@ def kept_rows(P: Rows) -> KeptRows:
         If P is empty: no choice of its rows is minimal for sure.
     """
     if P.prepared is not None:
-        return KeptRows(facets(P.program), *np.empty((2, 0), np.int64))
+        found = P.prepared.facets()
+        return KeptRows(facets(P.program) if found is None else found, *np.empty((2, 0), np.int64))
     implicit = np.array(implicit_equalities(P), dtype=np.int64)
     flat = made_explicit(P, implicit.tolist()) if implicit.size else P
     others = np.setdiff1d(np.arange(P.b.size), implicit)

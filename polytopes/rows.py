@@ -15,7 +15,7 @@ from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
 from polytopes.fractions_given import hold_fractions, rows_of_floats
 from polytopes.general_position import listed_vertices
-from polytopes.integers import maybe_short
+from polytopes.integers import is_short, maybe_short
 from polytopes.lengths import evened, lengths
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
@@ -137,7 +137,7 @@ class Rows(Value):
     @derived
     def exact(self) -> ExactGenerators | None:
         """The generators in integers, where the set is computed with in integers; see `exact_generators`."""
-        if self.prepared is not None and not maybe_short(self.A, self.b) and self.wide:
+        if self.prepared is not None and not self.short and self.wide:
             return None
         return exact_generators(self.A, self.b, self.C, self.d, self.program, self.made_of)
 
@@ -153,9 +153,14 @@ class Rows(Value):
         return None if self.d.size or not maybe_short(self.A, self.b) else short_vertices(self.A, self.b)
 
     @derived
+    def short(self) -> bool:
+        """Whether all rows are of few bits."""
+        return (not self.b.size or maybe_short(self.A, self.b)) and is_short(*self.table)
+
+    @derived
     def listed(self) -> Floats | None:
         """The vertices (k, n) of a bounded set that floats know well, and whose rows are not short."""
-        return None if self.prepared is None or maybe_short(self.A, self.b) else listed_vertices(self.prepared)
+        return None if self.prepared is None or self.short else listed_vertices(self.prepared)
 
     def with_rows(self, A: ArrayLike, b: ArrayLike) -> Self:
         """The same equalities with other inequalities ``A x <= b``: A (m, n), b (m,)."""
@@ -173,11 +178,12 @@ def _as_they_are(A: Any, b: Any) -> Table | None:
         return None
     rows.setflags(write=False)
     rhs.setflags(write=False)
-    return rows, rhs, *_no_equalities(rows.shape[1])
+    return rows, rhs, *no_equalities(rows.shape[1])
 
 
 @lru_cache(256)
-def _no_equalities(n: int) -> tuple[Floats, Floats]:
+def no_equalities(n: int) -> tuple[Floats, Floats]:
+    """C and d of a set of R^n without equalities, read-only."""
     C, d = np.empty((0, n)), np.empty(0)
     C.setflags(write=False)
     d.setflags(write=False)

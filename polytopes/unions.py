@@ -38,15 +38,15 @@ def convex_hull(sets: Sequence[HPolytope]) -> HPolytope:
 
 def _hull_rows(sets: Sequence[Rows]) -> Table:
     n = sets[0].dim
+    known = _of_exact_corners(sets) if len(sets) > 1 else None
+    if known is not None:
+        return known
     some = [P for P in sets if known_nonempty(P)]
     if not some:
         return nothing(n)
     if len(some) == 1:
         return some[0].A, some[0].b, some[0].C, some[0].d
-    known = _of_exact_corners(some)
-    if known is not None:
-        return known
-    if not all(P.listed is not None for P in some) and (
+    if not all(_by_floats(P) for P in some) and (
         all(P.exact is not None for P in some) or not all(is_bounded(P) for P in some)
     ):
         return float_rows(union([in_integers(P) for P in some]))
@@ -58,6 +58,11 @@ def _of_exact_corners(sets: Sequence[Rows]) -> Table | None:
     """The hull of sets whose vertices are floats of few bits; None if they are not such."""
     corners = [P.corners for P in sets]
     return exact_hull(np.vstack([V.points for V in corners if V])) if all(V and V.exact for V in corners) else None
+
+
+def _by_floats(P: Rows) -> bool:
+    """Whether floats know the vertices of a set that is not one of integers."""
+    return P.listed is not None or (P.as_box is not None and P.as_box.vertices is not None and not P.short)
 
 
 def _largest_supports(sets: Sequence[Rows], normals: Floats) -> Floats:

@@ -55,8 +55,11 @@ def vertices(P: Rows) -> Floats:
 
 
 def quick_vertices(P: Rows) -> Floats | None:
-    """The vertices (k, n) in lexicographic order, where one call of the core finds them; read-only."""
-    return P.listed if P.corners is None else P.corners.points
+    """The vertices (k, n) in lexicographic order, where one call of the core finds them; not to be written."""
+    known = None if P.as_box is None else P.as_box.vertices
+    if known is None:
+        known = P.listed if P.corners is None else P.corners.points
+    return known
 
 
 def in_order(found: ExactGenerators) -> Floats:

@@ -8,7 +8,6 @@ from polytopes.errors import UndecidedError
 from polytopes.exact import to_floats
 from polytopes.frame import unit_body
 from polytopes.general_position import summed_volume
-from polytopes.integers import maybe_short
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.qhull import points_volume
 from polytopes.rows import Rows
@@ -51,7 +50,7 @@ def _of_simplices(P: Rows) -> float | None:
     """The volume as a sum of those of simplices, where vertices and the rows that they lie on are certain."""
     if P.d.size:
         return None
-    if maybe_short(P.A, P.b):
+    if P.short:
         return short_volume(P.A, P.b)
     return None if P.prepared is None else summed_volume(P.prepared)
 

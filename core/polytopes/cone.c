@@ -235,6 +235,20 @@ void to_point(integer d, integer m, const double *at, const integer *rows, const
     }
 }
 
+/* A ray of length one on rows (d - 1,): a Newton step with residuals in twice the precision. */
+static void to_ray(const Cone *cone, const integer *rows, double *ray)
+{
+    const integer d = cone->d;
+    fill(cone->total, 0.0, d);
+    for (integer k = 0; k < d - 1; k++) {
+        Sum value = {0.0, 0.0, 0.0};
+        for (integer j = 0; j < d; j++) add_product(&value, cone->at[j * cone->m + rows[k]], ray[j]);
+        add_multiple(cone->total, value.total + value.lost, cone->inverse + k * d, d);
+    }
+    for (integer j = 0; j < d; j++) ray[j] -= cone->total[j];
+    to_unit_length(ray, d);
+}
+
 /* Rays of a cone: their number, or why there is no answer.
  *
  * at (d, m): rows of length about one, transposed; inner (d,): a point where all of them are negative; bounded: the last
@@ -281,6 +295,7 @@ EXPORTED integer fdi_cone_rays(integer d, integer m, const double *at, const dou
         for (integer i = 0; i < m - (bounded ? 1 : 0); i++) slack[0] = smaller(slack[0], -last[i] * scale);
         slack[1] = cone.steepest;
         if (bounded) to_point(d, m, at, rows, cone.inverse, cone.total, ray);
+        else to_ray(&cone, rows, ray);
     }
     return count;
 }

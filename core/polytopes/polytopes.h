@@ -88,6 +88,8 @@ void put_column(double *c, const Rows *rows, integer i);
 integer irredundant(const Rows *rows, const double *x0, const integer *known, integer *chosen, integer *doubtful,
                     Memory memory);
 integer irredundant_room(integer d, integer m);
+integer fdi_irredundant(integer d, integer m, const double *at, const double *b, const double *x0, integer *chosen,
+                        integer *doubtful, double *block);
 
 /* programs.c */
 integer fdi_interior_room(integer d, integer m);

@@ -42,6 +42,17 @@ EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const do
     return fdi_strictly_inside(d, m, set.at, set.b, set.centre, NULL, NULL, scratch);
 }
 
+EXPORTED integer fdi_prepared_facets_room(integer d, integer m) { return m + irredundant_room(d, m); }
+
+/* Numbers of a minimal set of the rows of a prepared set, and which of them are doubtful (m,); how many. */
+EXPORTED integer fdi_prepared_facets(integer d, integer m, double *prepared, integer *chosen, integer *doubtful,
+                                     double *block)
+{
+    Prepared set;
+    lay_out_prepared(&set, prepared, d, m);
+    return fdi_irredundant(d, m, set.at, set.b, set.centre, chosen, doubtful, block);
+}
+
 EXPORTED integer fdi_prepared_ball_room(integer d, integer m) { return d + 1 + 2 * m + fdi_interior_room(d, m); }
 
 /* Centre (d,) and radius of a largest ball of a prepared set in the units of its rows (m, d), one after the other.

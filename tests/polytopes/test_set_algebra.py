@@ -241,7 +241,8 @@ def test_hulls_have_one_row_per_facet_with_and_without_doubt() -> None:
         assert hull.contains(points, tol=1e-13).all()
         assert hull.b.size == hull.remove_redundancy().b.size
         assert facets is None or hull.b.size == facets
-        assert hull.equals(HPolytope.from_vertices(hull.vertices()), tol=1e-11)
+        # vertices are right to 1e-13, which the sharpest corner of the first points multiplies by a thousand
+        assert hull.equals(HPolytope.from_vertices(hull.vertices()), tol=1e-10)
 
 
 def test_inner_box_of_known_sets() -> None:
