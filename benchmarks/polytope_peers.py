@@ -41,6 +41,12 @@ LARGE = {
     "200 rows in R^6": ("support", "bounding box", "redundancy", "contains a set", "intersection not empty"),
 }
 TOO_LONG = {("200 rows in R^6", "Parma"), ("cross-polytope in R^7", "polytope"), ("cube in R^10", "polytope")}
+LEFT_OUT = {  # thousands of sums of vertices: minutes in rationals; and a shadow with slivers that only rounding made
+    ("projection", "turned cross-polytope in R^3"),
+    ("Minkowski sum", "30 rows in R^4"),
+    ("Minkowski sum", "units from 1e-6 to 1e3 in R^4"),
+    ("Minkowski sum", "permutahedron in R^3"),
+}
 Line = dict[str, Any]
 
 
@@ -48,7 +54,7 @@ def lines() -> list[tuple[str, Instance]]:
     """Operations and instances, in the order of the table."""
     usual = [*instances.small(), *instances.decimal(), *instances.degenerate(), *instances.uneven()]
     return [
-        *((operation, case) for operation in peers.OURS for case in usual),
+        *((o, case) for o in peers.OURS for case in usual if (o, case.name) not in LEFT_OUT),
         *((operation, case) for case in instances.large() for operation in LARGE[case.name]),
     ]
 
