@@ -171,7 +171,6 @@ CONSTANTS = (
     Constant("svo.observers.window.prover", "_EPS", "heuristic"),
     Constant("svo.observers.window.chain_starts", "_ROUNDED_UP", "heuristic"),
     Constant("svo.observers.window.sign_split", "_INEXACT", "heuristic"),
-    Constant("svo.observers.window.hints", "_ROOM", "heuristic"),
     Constant("svo.observers.window.hints", "_MARGIN", "heuristic"),
     Constant("svo.observers.window.hints", "_OTHERWISE", "heuristic"),
     Constant("svo.observers.zonotope.zonotope", "_PIVOT", "heuristic"),

@@ -12,8 +12,8 @@ from svo.models.nonlinear import NonlinearModel, Undecided
 from svo.models.state_range import within
 
 PARTS = 4096  # of a sample: what substeps are counted in
-_ROOM = 0.005  # of what a trajectory moves: what a box is larger by at first
-_OTHERWISE = 0.03  # of what an end of the set moves within a substep: how much wider another's next one may begin
+_ROOMS = (0.002, 0.005, 0.02, 0.1)  # of what a trajectory moves: what a box is larger by at first
+_OTHERWISE = 0.01  # of what an end of the set moves within a substep: how much wider another's next one may begin
 _TRIALS = 12  # of ever larger boxes
 _MARGIN = 0.1  # of the room: at least so much of it is left
 _ROUNDED = 1e-13  # of the terms of a sum in floats: more than it rounds
@@ -39,21 +39,40 @@ def hinted(model: NonlinearModel, boxes: Array, u: Array, h: Sequence[float]) ->
 
 
 def _grown(model: NonlinearModel, before: Array, box: Array, u: Array, h: float) -> Array:
-    """One of them."""
+    """The one of those that are tried of which the plant makes least."""
+    wide = box[1] - box[0]
+    least, best = np.inf, None
+    for share in _ROOMS:
+        found = _held(model, before, box, u, h, share)
+        if found is None:
+            continue
+        hint, image = found
+        left = np.minimum(hint[1], image[1]) - np.maximum(hint[0], image[0])
+        more = float(((left - wide) / (wide + 1e-200)).max())
+        if more < least:
+            least, best = more, hint
+    if best is None:
+        raise Undecided("no box was found that is plainly one that the state keeps to")
+    return best
+
+
+def _held(
+    model: NonlinearModel, before: Array, box: Array, u: Array, h: float, share: float
+) -> tuple[Array, Array] | None:
+    """A box with room for a share of what a trajectory moves, or more, and what the plant makes of it."""
     wide = box[1] - box[0]
     moved = np.maximum(wide - (before[1] - before[0]), 0.0)
-    room = _ROOM * moved + 1e-9 * wide + 1e-13 * np.abs(box).max(axis=0) + 1e-200
-    image: Array | None = box
+    room = share * moved + 1e-9 * wide + 1e-13 * np.abs(box).max(axis=0) + 1e-200
     for trial in range(_TRIALS):
         box = np.array(within(model.physical_range, box[0] - room, box[1] + room))
         image = _image(model, before, box, u, h)
         if image is None:
-            break
+            return None
         if _is_inside(model, image, box, _MARGIN * room):
-            return box
+            return box, image
         box = np.array([np.minimum(box[0], image[0]), np.maximum(box[1], image[1])])
         room = room + 0.1 * trial * np.maximum(box[1] - box[0] - wide, 0.0)
-    raise Undecided("no box was found that is plainly one that the state keeps to")
+    return None
 
 
 def _is_inside(model: NonlinearModel, image: Array, box: Array, margin: Array) -> bool:
