@@ -29,7 +29,7 @@ def inverse_of(run: Trajectory) -> Any:
 
 def proven_box(run: Trajectory, chain: Any, inverse: Any) -> tuple[Any, Any]:
     """As near to what the checker takes as an iteration comes, from both sides of the state."""
-    step = {"first": 0, "last": inverse.shape[1] - 1, "on_start": CHECK.NOTHING}
+    step = {"first": 0, "last": inverse.shape[1] - 1, "on_start": {"shape": [0], "hex": ""}}
     low, high = run.x[0] - 1.0, run.x[0] + 1.0
     for _ in range(10):
         wide = [CHECK.up(CHECK.READ_WITHIN * size) for size in CHECK.largest(low, high)]
