@@ -375,10 +375,13 @@ class Equations(Model):  # a nonlinear model: what has been linearised of it sta
         n, nu, ny, nw = (count(record[key]) for key in ("n", "inputs", "outputs", "disturbances"))
         shape, told = [1, 1, n + ny, n + nu + 1 + nw], record["equations"]
         super().__init__(record | {"matrices": {"stacks": {"shape": shape, "hex": " ".join(["0"] * math.prod(shape))}}})
-        self.nw, self.is_map, self.varies = nw - n, not told["continuous"], told["varying"]
+        self.nw, self.is_map, self.varies = count(nw - n), not told["continuous"], {*map(count, told["varying"])}
         self.times = array(plant["intervals"], None) if "intervals" in plant else [real(plant["Ts"])]
-        expect(not self.delta + self.sums and all(count(j) < nw - n for j in self.varies), "an entry is none of it")
-        self.w = box_of(*(row[: nw - n] for (row,) in self._bounds[1:]))  # one row for all samples
+        parts = slice(self.nw), slice(self.nw, nw)  # one row for all samples
+        self.w, left_out = (box_of(*(row[part] for (row,) in self._bounds[1:])) for part in parts)
+        others = *self._remainder, *(row[self.nw :] for row in self.w_rows), self.delta, self.sums
+        is_one = max(self.varies, default=-1) < self.nw and left_out == [(-ONE, ONE)] * n
+        expect(is_one and not any(map(any, others)), "the model has an entry that is none of a nonlinear one")
         self.f, self.h = (Tape(told[name], n + self.nw + nu, rows) for name, rows in (("f", n), ("h", ny)))
         self.valid = range_of(told["valid"] and [array(end, n) for end in told["valid"]], n, False)
         self.held = range_of(self.physical and self.physical.box, n, True)
@@ -410,8 +413,7 @@ class Equations(Model):  # a nonlinear model: what has been linearised of it sta
         image = [*self.image(start, self.forms(self.f, box, u, is_known=False), box, h)]
         for a, b, (low, high) in pairs(image, box, self.held):
             expect((b[0] < a[0] or b[0] <= low) and (a[1] < b[1] or high <= b[1]), "a box does not hold the trajectory")
-        box = [both(a, b) for a, b in pairs(image, box)]
-        return box, self.forms(self.f, box, u)
+        return (box := [both(a, b) for a, b in pairs(image, box)]), self.forms(self.f, box, u)
 
     def substep(self, lines, box, forms, h):  # rows in the first x, w and a constant, after h in a box
         n, own = self.n, lines_of(forms, [*box, *self.w])
@@ -440,8 +442,7 @@ class Equations(Model):  # a nonlinear model: what has been linearised of it sta
             box, forms = self.enclosed(start, box_of(*bounds), u, part * share)
             image = self.image(start, forms, box, part * share)
             lines = [*self.substep(lines, box, forms, part * share)]
-            after = [both(a, plus(line[1], dot(line[0], first))) for a, line in pairs(box, lines)]
-            start = [both(a, b) for a, b in pairs(after, image)]
+            start = [both(both(a, b), plus(line[1], dot(line[0], first))) for a, b, line in pairs(box, image, lines)]
         return lines, start
 
     def output(self, box, u):  # rows; what varies need not be the w of the next step
@@ -459,8 +460,7 @@ class Linearised(Chain):  # a chain whose samples are linearised over what it ha
         if kind not in ("output", "transition"):
             if kind == "start":
                 model.transitions, model.readings = {}, {}
-            super().take(step)
-            return
+            return super().take(step)
         k, box = self._sample(step["sample"]), [*pairs(*self._set(step["sample"]).box)]
         expect(all(low <= high for low, high in box), "two bounds of a state exclude each other")
         box, u = box_of(*pairs(*box)), self.log.u[k]

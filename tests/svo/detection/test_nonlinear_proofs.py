@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from checkers import CHECK, FOLDER
+from checkers import CHECK, FOLDER, NONLINEAR
 from proof_cases import Made, answer, proven, steps_of, with_steps
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
@@ -233,7 +233,13 @@ def changed(model: Callable[[dict[str, Any]], None], files: Files) -> Files:
     return files[0], path, files[2]
 
 
-@pytest.mark.parametrize("what", ["wider w", "more noise", "varying", "narrower valid", "a map", "another function"])
+OTHER_MODELS = (
+    "wider w", "more noise", "varying", "narrower valid", "a map", "another function",
+    "a remainder of its own", "nothing is left out", "rows on what is left out", "varying what is left out",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("what", OTHER_MODELS)
 def test_a_proof_of_another_model_is_refused(reactor: Files, what: str) -> None:
     def change(record: dict[str, Any]) -> None:
         told = record["equations"]
@@ -245,12 +251,32 @@ def test_a_proof_of_another_model_is_refused(reactor: Files, what: str) -> None:
             told["varying"] = [0, 1]
         elif what == "narrower valid":
             told["valid"] = [{"shape": [2], "hex": f"0 {low.hex()}"} for low in (340.0, 350.0)]
+        elif what == "a remainder of its own":  # which proofs of outputs would not count
+            record["remainder"] = {"shape": [1, 1], "hex": (1e-9).hex()}
+        elif what == "nothing is left out":  # remainders would then be multiplied by zero
+            record["w_upper"]["hex"] = " ".join([*record["w_upper"]["hex"].split(" ")[:2], "0", "0"])
+        elif what == "rows on what is left out":
+            told_rows = {"rows": {"shape": [1, 4], "hex": f"0 0 {(1.0).hex()} 0"}}
+            record["w_rows"] = told_rows | {end: {"shape": [1], "hex": "0"} for end in ("lower", "upper")}
+        elif what == "varying what is left out":
+            told["varying"] = [2]
         elif what == "a map":
             told["continuous"] = False
         else:
             told["f"]["op"] = [12 if op == 9 else op for op in told["f"]["op"]]
 
     assert claims(changed(change, reactor)) == []
+
+
+def test_what_varies_counts_once(reactor: Files) -> None:
+    plant = json.loads(reactor[1].read_text())
+    record, bounds = plant["observers"]["nominal"], []
+    for varying in ([0], [0, 0]):
+        record["equations"]["varying"] = varying
+        model = CHECK.linearised(record, plant, CHECK.Log(reactor[2], plant["columns"]), 0).model
+        bounds.append([*model.output([(0, 1), (NONLINEAR.ONE, 400 * NONLINEAR.ONE)], [300.0])])
+        assert [*model.varies] == [0]
+    assert bounds[0] == bounds[1]
 
 
 # -- alarms that just are some, of models alone -----------------------------------------------------------------------
