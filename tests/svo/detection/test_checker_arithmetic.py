@@ -36,6 +36,11 @@ def in_units(value: int) -> arb:
     return arb(fmpz(value)) / ONE
 
 
+def test_half_a_turn_is_not_below_pi() -> None:
+    with ctx.workprec(BITS + 1000):
+        assert arb.pi() < in_units(NONLINEAR.HALF_TURN) < arb.pi() + 2 / ONE
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_function_of_a_number_is_enclosed_within_a_few_units(name: str) -> None:
     function, exact, largest = FUNCTIONS[name]

@@ -151,3 +151,39 @@ def test_any_multipliers_prove_only_what_holds_on_a_run(seeds: range) -> None:
             assert exact(chain._total(step)) <= 0, seed
             tight += math.isclose(total, -value)
     assert tight > len(seeds) // 100  # some bounds are reached: none has room to spare
+
+
+class Full(Trajectory):
+    """Numbers with all their digits, where a product is rounded down as often as up."""
+
+    def short(self, *shape: int) -> Any:
+        return super().short(*shape) * (1.0 + self.rng.random(shape)) / 3.0
+
+
+def exactly(values: Any) -> list[Fraction]:
+    return [abs(Fraction(float(v))) for v in values]
+
+
+def test_sizes_that_are_rounded_are_rounded_up() -> None:
+    """What factors leave out, and how far states get, are never below their formula in fractions."""
+    equal = compared = 0
+    for run in (run for run in map(Full, range(40)) if run.items):
+        log = SimpleNamespace(time=[0] * SAMPLES, u=run.u.tolist())
+        chain = CHECK.Chain(CHECK.Model(run.record()), log, SAMPLES - 1)
+        stack, most = run.stacks[0], [max(exactly(ends)) for ends in run.delta]
+        left_out = chain._choose(0)[3]
+        for (i, j), found in left_out.items():
+            exact = sum(d * abs(Fraction(float(item[i, j]))) for d, item in zip(most, stack[1:], strict=True))
+            compared, equal = compared + 1, equal + (Fraction(found) == exact)
+            assert Fraction(found) >= exact
+        known = CHECK.Set([run.x[0].tolist(), run.x[0].tolist()])
+        low, high = (row.tolist() for row in (run.w[0], run.w[0]))
+        chain.model.bounds = lambda k, low=low, high=high: (None, low, high, None)
+        first, second = chain._reach(known, 0, 1)
+        for i, found in enumerate(second[: run.n]):
+            sizes = [abs(Fraction(float(v))) for v in stack[0][i]]
+            sizes = [a + sum(d * abs(Fraction(float(item[i, j]))) for d, item in zip(most, stack[1:], strict=True))
+                     for j, a in enumerate(sizes)]  # fmt: skip
+            assert Fraction(found) >= sum(a * b for a, b in zip(sizes, exactly(first), strict=True))
+    assert compared > 100
+    assert equal < compared / 2
