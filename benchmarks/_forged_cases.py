@@ -277,7 +277,10 @@ class WithLog(Records):
         if log.time[alarm.sample] != alarm.time:
             return "another time"
         first = alarm.sample + 1 - len(c.samples)
-        if alarm.source.get("model") == "nonlinear":
+        models = plant_record(plant, "stated", log)["observers"]
+        if alarm.observer not in models:
+            return "no such observer"
+        if "matrices" not in models[alarm.observer]:
             used = [~np.isnan(s.y) for s in c.samples]
             if any(
                 not (s.y[at] == log.y[first + k][at]).all()
@@ -285,9 +288,6 @@ class WithLog(Records):
             ):
                 return "other readings"
             return "explained by its own numbers" if witness(*of_window(c)) else None
-        models = plant_record(plant, "stated", log)["observers"]
-        if alarm.observer not in models:
-            return "no such observer"
         instants, delta = of_plant(models[alarm.observer], log, first, alarm.sample)
         if not c.late:
             instants[-1] = replace(
