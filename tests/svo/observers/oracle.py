@@ -111,12 +111,12 @@ class FullInformation:
             "A_eq": matrix[equal],
             "b_eq": high[equal],
             "bounds": [(None, None)] * (self.columns - 1) + [(-1.0, None) if margin else (0.0, 0.0)],
-            "method": "highs",
         }
-        for options in _OPTIONS:
-            result = linprog(**program, options=options)
-            if result.status in (0, 2):
-                return result
+        for method in ("highs", "highs-ipm"):  # where the simplex method leaves it open, the other one
+            for options in _OPTIONS:
+                result = linprog(**program, method=method, options=options)
+                if result.status in (0, 2):
+                    return result
         raise AssertionError(f"the oracle's solver answered {result.status}: {result.message}")
 
     def _add(self, row: dict[int, float], low: float, high: float, soft: float = 0.0) -> None:
