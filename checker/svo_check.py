@@ -479,7 +479,8 @@ def main():
         intervals = array(plant["intervals"], len(log.time) - 1) if "intervals" in plant else None
         log.check_times(max(sample for _, sample, _ in found), real(plant["Ts"]), intervals)
     except REFUSALS as error:
-        why = str(error) if isinstance(error, Wrong) else f"not of the format ({type(error).__name__}: {error})"
+        is_said = isinstance(error, Wrong | OSError)
+        why = str(error) if is_said else f"not of the format ({type(error).__name__}: {error})"
         print(f"NOT PROVEN: {at}: {why:.250}")
         return 1
     for observer, sample, chain in found:
