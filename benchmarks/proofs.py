@@ -105,7 +105,7 @@ def random_run(seed: int) -> dict[str, Any]:
         at = observer.run(bad).falsified_at
         if at is not None:
             of, begun = ModelOnLog(model, first, bad), process_time()
-            found = ChainProver(of, 0, own_start(None, 0, first, None)).prove(at)
+            found = ChainProver(of, 0, own_start(None, first)).prove(at)
             row[name] = {"start": None if found is None else found.start.kind, "s": process_time() - begun}
             row[name]["before"] = None if found is None else at - found.start.sample
     return row

@@ -20,13 +20,12 @@ from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
 from svo.observers.given_units import arrival_out
 from svo.observers.window.certificate import OnWindow, WindowCertificate
-from svo.observers.window.chain_starts import Start
+from svo.observers.window.chain import prover_of
+from svo.observers.window.chain_starts import Start, own_start
 from svo.observers.window.evidence import ArrivalSet
-from svo.observers.window.linearised_prover import LinearisedProver
-from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
-from svo.observers.window.prover import ChainProver, ProvenChain
-from svo.observers.window.setup import joint_rows
+from svo.observers.window.prover import ProvenChain
+from svo.observers.window.setup import rows_on_w
 from svo.plant import BankChoice, MonitoredPlant, with_bank
 from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
@@ -44,12 +43,10 @@ def _unknowns(alarm: Alarm, model: UncertainModel) -> str | None:
     if proof is None:
         return None
     known = np.array([model.uncertainties[item - 1].bounds for item in proof.owner]).reshape(-1, 2)
-    polytope = model.disturbance_polytope
-    rows = (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0)) if polytope is None else joint_rows(polytope)
     stated = (proof.w_rows, proof.w_rows_lower, proof.w_rows_upper)
     if not np.array_equal(proof.delta, known):
         what = "bounds of Delta are"
-    elif not all(np.array_equal(mine, its) for mine, its in zip(stated, rows, strict=True)):
+    elif not all(np.array_equal(mine, its) for mine, its in zip(stated, rows_on_w(model), strict=True)):
         what = "rows on w are"
     elif proof.sums is not None:
         what = "bounds of sums are"
@@ -226,11 +223,7 @@ def _prove(models: PlantModels, alarm: Alarm) -> tuple[ProvenChain | None, str]:
     if begun is None:
         where = f"at sample {alarm.sample}"
         return None, f"run again over the log, the plant's bank does not ask its observer {alarm.observer!r} {where}"
-    prover: ChainProver | LinearisedProver
-    if isinstance(observer.model, NonlinearModel):
-        prover = LinearisedProver(observer.model, log, *begun)
-    else:
-        prover = ChainProver(ModelOnLog(observer.model, first, log), *begun)
+    prover = prover_of(observer, first, log, *begun)
     found = prover.prove(alarm.sample)
     if found is None:
         splits = isinstance(observer, WindowObserver) and observer.sign_split
@@ -252,13 +245,10 @@ def _beginning(bank: Bank, alarm: Alarm, log: Log, first: ArrivalSet) -> tuple[i
     step = next(verdict for verdict in drive(bank, log) if verdict.sample == alarm.sample).steps.get(alarm.observer)
     if step is None:
         return None
-    since, largest, at = alarm.sample - step.sample, observer.model.start_range, observer.largest_at
-    if at is not None and at >= 0 and largest is not None:
-        return since, Start("largest", since + at, ArrivalSet.box(largest.lower, largest.upper))
-    if since == 0:
-        return 0, Start("first", 0, first)
-    if not (isinstance(observer, WindowObserver) and observer.current_window.is_given):
-        return since, None
+    since = alarm.sample - step.sample
+    begun = own_start(observer.model.start_range, first, observer.largest_at, since)
+    if begun is not None or not (isinstance(observer, WindowObserver) and observer.current_window.is_given):
+        return since, begun
     own = arrival_out(observer.current_window.anchor, observer.current_window.settings.form)
     left_by = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
     return since, Start("assumed", since, own, because=left_by)

@@ -21,7 +21,7 @@ from svo.models.nonlinear import NonlinearModel
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.proof_steps import encode_set
-from svo.observers.window.setup import joint_rows
+from svo.observers.window.setup import rows_on_w
 from svo.plant import MonitoredPlant
 from svo.plant.dialects import on_log
 from svo.plant.scheduling import scheduled
@@ -119,9 +119,8 @@ def _described(name: str, first: ArrivalSet, model: UncertainModel, log: Log | N
 
 def _entries(first: ArrivalSet, model: UncertainModel, lower: Array, upper: Array, noise: Array) -> dict[str, Any]:
     """Sizes, bounds, rows on w, and sets."""
-    polytope = model.disturbance_polytope
-    rows = (np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0)) if polytope is None else joint_rows(polytope)
     delta = np.array([u.bounds for u in model.uncertainties]).reshape(-1, 2)
+    w_rows = dict(zip(("rows", "lower", "upper"), rows_on_w(model), strict=True))
     ranges = {"physical": model.physical_range, "largest": model.start_range}
     return {
         "n": model.n_states,
@@ -132,7 +131,7 @@ def _entries(first: ArrivalSet, model: UncertainModel, lower: Array, upper: Arra
         "noise": encode_value(noise),
         "w_lower": encode_value(lower),
         "w_upper": encode_value(upper),
-        "w_rows": {key: encode_value(value) for key, value in zip(("rows", "lower", "upper"), rows, strict=True)},
+        "w_rows": {key: encode_value(value) for key, value in w_rows.items()},
         "first": encode_set(first),
         **{key: None if r is None else [encode_value(r.lower), encode_value(r.upper)] for key, r in ranges.items()},
     }

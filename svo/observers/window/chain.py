@@ -18,8 +18,10 @@ from svo.checks import Array, expect_kind
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models.nonlinear import NonlinearModel
+from svo.observers.base import Observer
 from svo.observers.window.certificate import WindowCertificate
-from svo.observers.window.chain_starts import own_start
+from svo.observers.window.chain_starts import Start, own_start
+from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.linearised_prover import LinearisedProver
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
@@ -64,6 +66,19 @@ class LateMeasurement(Shown):
     arrived: int
     taken: int
     y: Array
+
+
+def prover_of(
+    observer: Observer, first: ArrivalSet, log: Log, since: int, begun: Start | None
+) -> ChainProver | LinearisedProver:
+    """What proves falsifications of an observer's model, by directions of its own if it has some.
+
+    ``first`` was its set at its first sample, and it ran from ``begun`` on; ``since`` the model is claimed to hold.
+    """
+    if isinstance(observer.model, NonlinearModel):
+        return LinearisedProver(observer.model, log, since, begun)
+    template = observer.directions[observer.model.n_states :] if isinstance(observer, WindowObserver) else None
+    return ChainProver(ModelOnLog(observer.model, first, log), since, begun, template)
 
 
 def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasurement] = ()) -> ChainCheck:
@@ -117,11 +132,8 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
     found: ProvenChain | None = None
     prover: ChainProver | LinearisedProver | None = None
     if at is not None:
-        data, own = replace(log, y=y), own_start(again.model.start_range, 0, first, again.largest_at)
-        if isinstance(again.model, NonlinearModel):
-            prover = LinearisedProver(again.model, data, 0, own)
-        else:
-            prover = ChainProver(ModelOnLog(again.model, first, data), 0, own)
+        own = own_start(again.model.start_range, first, again.largest_at)
+        prover = prover_of(again, first, replace(log, y=y), 0, own)
         found = prover.prove(at)
     return ChainCheck(
         proven=found is not None,

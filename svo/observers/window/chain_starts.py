@@ -75,14 +75,17 @@ class Start:
         return f"from {'the readings since ' if self.kind == 'readings' else ''}sample {self.sample}"
 
 
-def own_start(largest: StateRange | None, since: int, first: ArrivalSet, largest_at: int | None) -> Start:
-    """Where an observer began that was given a set at sample ``since`` of the log.
+def own_start(
+    largest: StateRange | None, first: ArrivalSet, largest_at: int | None = None, since: int = 0
+) -> Start | None:
+    """Where an observer began; None if it was given another set than the first one, after the log's first sample.
 
-    ``largest_at`` is the sample, counted from there, at which it began again from the model's ``largest`` set.
+    ``since`` is the sample of the log at which it was given a set, and ``largest_at`` that, counted from there, at
+    which it began again from the model's ``largest`` one; one below zero is what the given set rests on.
     """
-    if largest_at is not None and largest is not None:
+    if largest_at is not None and largest_at >= 0 and largest is not None:
         return Start("largest", since + largest_at, ArrivalSet.box(largest.lower, largest.upper))
-    return Start("assumed" if since else "first", since, first)
+    return None if since else Start("first", 0, first)
 
 
 def from_readings(of: ModelOnLog, sample: int, last: int) -> Start | None:

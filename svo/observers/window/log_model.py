@@ -1,8 +1,7 @@
 """A model at the samples of a log: the one door by which a proof asks for matrices, bounds and data.
 
-A linear model has its numbers at once. A model that is linearised has those of a sample only once the state there is
-known: whoever proves a chain of its windows gives `ModelOnLog.at` the box that the chain has proven of that sample. The
-checker's counterpart, ``Model.stack`` and ``Model.bounds``, then has what the proof file's step of that sample says.
+Of linear models: one that is linearised has the numbers of a sample only once the state there is known, and
+`svo.observers.window.linearised_prover` makes them. The checker's counterpart is ``Model.stack`` and ``Model.bounds``.
 """
 
 from __future__ import annotations
@@ -15,8 +14,6 @@ from svo.models import ModelSample, NormalForm, UncertainModel
 from svo.models.intervals import interval_of
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.sample import Sample
-
-Box = tuple[Array, Array]
 
 
 class ModelOnLog:
@@ -41,21 +38,14 @@ class ModelOnLog:
         """Bounds (items, 2) of each Delta."""
         return np.array([u.bounds for u in self.model.uncertainties]).reshape(-1, 2)
 
-    def at(self, k: int, box: Box | None = None) -> ModelSample:
-        """Matrices and bounds of sample k, with the transition to the next one, in the user's units.
-
-        Parameters
-        ----------
-        k : int
-        box : (lower, upper) of (n,) arrays, optional
-            What has been proven of the state there; a linear model does not ask.
-        """
+    def at(self, k: int) -> ModelSample:
+        """Matrices and bounds of sample k, with the transition to the next one, in the user's units."""
         dt = self.log.interval_at(k + 1) if k + 1 < len(self.log) else None
         return ModelSample.of(self.model, self.log.schedule_at(k), interval_of(self.model, dt))
 
-    def sample(self, k: int, box: Box | None = None) -> Sample:
+    def sample(self, k: int) -> Sample:
         """Sample k as a window takes it, in normal form."""
-        form, log, found = self.form, self.log, self.at(k, box)
+        form, log, found = self.form, self.log, self.at(k)
         assert found.w is not None
         lower, upper = found.w
         before = log.u[k - 1] if k else np.zeros(log.u.shape[1])

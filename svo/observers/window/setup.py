@@ -56,12 +56,17 @@ def joint_rows(P: HPolytope) -> tuple[Array, Array, Array]:
     return rows[joint], lower[joint], upper[joint]
 
 
-def disturbance_rows(form: NormalForm) -> tuple[Array, Array, Array]:
-    """Rows on several disturbances, in normal form, with their bounds as they are given."""
-    polytope = form.given.disturbance_polytope
+def rows_on_w(model: UncertainModel) -> tuple[Array, Array, Array]:
+    """Rows on several disturbances of a model, with their bounds."""
+    polytope = model.disturbance_polytope
     if polytope is None:
-        return np.zeros((0, form.given.n_disturbances)), np.zeros(0), np.zeros(0)
-    rows, lower, upper = joint_rows(polytope)
+        return np.zeros((0, model.n_disturbances)), np.zeros(0), np.zeros(0)
+    return joint_rows(polytope)
+
+
+def disturbance_rows(form: NormalForm) -> tuple[Array, Array, Array]:
+    """The same in normal form, with their bounds as they are given."""
+    rows, lower, upper = rows_on_w(form.given)
     return rows * form.w, lower, upper
 
 

@@ -313,7 +313,7 @@ def is_checked(found: ProvenChain, observer: WindowObserver, log: Log, at: int, 
 def chain_of(observer: WindowObserver, log: Log, at: int) -> ProvenChain | None:
     first = observer.first_set
     assert first is not None
-    begun = own_start(observer.model.start_range, 0, first, observer.largest_at)
+    begun = own_start(observer.model.start_range, first, observer.largest_at)
     return LinearisedProver(observer.model, log, 0, begun).prove(at)
 
 

@@ -79,11 +79,15 @@ def test_the_checker_proves_what_full_proves(seed: int, tmp_path: Path) -> None:
     for is_long in (False, True):
         (folder := tmp_path / str(is_long)).mkdir()
         with long_chains() if is_long else nullcontext():
-            files = proven(*random_plant(seed), folder)
+            plant, log = random_plant(seed)
+            files = proven(plant, log, folder)
         if files is None:
             return
         code, text = answer(*files)
         assert code == 0, text
+        n, steps = plant.model.n_states, steps_of(files[0])
+        assert next(s for s in steps if s.get("step") == "start")["template"]["shape"] == [seed % 2, n]
+        assert any(s.get("row", 0) >= n for s in steps) is (is_long and bool(seed % 2))  # bounds along it
         assert ("given that the first set of the model holds the state at sample 0" in text) is is_long
         assert ("where the readings alone say where the state is" in text) is not is_long
         assert ("AXIOM" in text) is bool(seed % 2)
