@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from checkers import CHECK, FOLDER
 
 from polytopes import HPolytope
 from svo import ArchitectureI, ScheduleTable, UncertainModel, Uncertainty, WindowObserver, verify
@@ -21,7 +22,7 @@ from svo.logs.csv import write_csv
 from svo.logs.log import Log
 from svo.logs.names import Column, Columns
 
-CHECKER = Path(__file__).parents[3] / "checker" / "svo_check.py"
+Files = tuple[Path, Path, Path]  # proof, plant and log
 
 
 class Made:
@@ -90,7 +91,7 @@ def tiny() -> tuple[Made, Log, int]:
     return Made(model, horizon=2), log, 6
 
 
-def proven(plant: Any, log: Log, folder: Path, noise: str = "stated") -> tuple[Path, Path, Path] | None:
+def proven(plant: Any, log: Log, folder: Path, noise: str = "stated") -> Files | None:
     """Proof, model and log of a run's alarms as files; None where nothing was falsified."""
     bank, values = plant.bank(noise), plant.scheduler()
     schedule = [values(y, u) for y, u in zip(log.y, log.u, strict=True)]
@@ -112,10 +113,20 @@ def proven(plant: Any, log: Log, folder: Path, noise: str = "stated") -> tuple[P
 
 def answer(proof: Path, plant: Path, log: Path) -> tuple[int, str]:
     """Exit code of the checker and what it says, in a process without this project on its path."""
-    command = [sys.executable, "-I", str(CHECKER), str(proof), "--model", str(plant), "--log", str(log)]
+    command = [sys.executable, "-I", str(FOLDER / "svo_check.py"), str(proof), "--model", str(plant), "--log", str(log)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert "Traceback" not in done.stderr, done.stderr
     return done.returncode, done.stdout + done.stderr
+
+
+def claims(files: Files) -> list[tuple[str, int, list[str]]]:
+    """What the checker takes as proven, and given what; none if it refuses."""
+    plant = json.loads(files[1].read_text())
+    try:
+        found = CHECK.check(files[0], plant, CHECK.Log(files[2], plant["columns"]))
+    except CHECK.REFUSALS:
+        return []
+    return [(observer, sample, chain.premises) for observer, sample, chain in found]
 
 
 def steps_of(proof: Path) -> list[dict[str, Any]]:

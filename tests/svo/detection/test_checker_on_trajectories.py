@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from fractions import Fraction
 from types import SimpleNamespace
@@ -10,13 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from proof_cases import CHECKER
-
-SPEC = importlib.util.spec_from_file_location("svo_check_on_trajectories", CHECKER)
-assert SPEC is not None
-assert SPEC.loader is not None
-CHECK = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(CHECK)
+from checkers import CHECK
 
 SAMPLES = 4
 

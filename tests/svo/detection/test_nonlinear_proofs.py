@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import json
-import sys
 from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
@@ -13,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from checkers import CHECK, FOLDER, NONLINEAR
-from proof_cases import Made, answer, proven, steps_of, with_steps
+from checkers import CHECK, NONLINEAR
+from proof_cases import Files, Made, answer, claims, proven, steps_of, with_steps
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
@@ -30,7 +28,6 @@ from svo.store.values import encode_value
 from tests.svo.models.nonlinear_plants import CASES, Case
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
-Files = tuple[Path, Path, Path]
 
 
 class Nonlinear(Made):
@@ -63,34 +60,12 @@ def growth() -> Case:
     return Case(model, np.array([0.6, 0.5, 3.0]), np.array([0.05, 0.05, 0.1]), lambda k: [0.1 * np.sin(k)])
 
 
-def claims(files: Files) -> list[tuple[str, int, list[str]]]:
-    """What the checker takes as proven, and given what; none if it refuses."""
-    plant = json.loads(files[1].read_text())
-    try:
-        found = CHECK.check(files[0], plant, CHECK.Log(files[2], plant["columns"]))
-    except CHECK.REFUSALS:
-        return []
-    return [(observer, sample, chain.premises) for observer, sample, chain in found]
-
-
 @pytest.fixture(scope="module")
 def reactor(tmp_path_factory: pytest.TempPathFactory) -> Files:
     case = CASES["cstr"]()
     files = proven(Nonlinear(case), run_of(case), tmp_path_factory.mktemp("reactor"))
     assert files is not None
     return files
-
-
-def test_the_second_file_is_short_and_needs_the_first_and_the_standard_library() -> None:
-    text = (FOLDER / "svo_check_nonlinear.py").read_text(encoding="utf-8")
-    assert text.count("\n") < 500
-    names = {
-        (alias.name if isinstance(node, ast.Import) else node.module or "").partition(".")[0]
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Import | ast.ImportFrom)
-        for alias in node.names
-    }
-    assert names <= sys.stdlib_module_names | {"svo_check"}
 
 
 LONG = ("lorenz", "tank", "crane")  # of the processor's time
