@@ -8,6 +8,7 @@ from itertools import product
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polytopes.checks import Floats
 from polytopes.native import Address, Entries, Integer, function
@@ -45,15 +46,20 @@ class Box(NamedTuple):
         return cls(found) if _box(m, n, A.tobytes(), b.tobytes(), found) else None
 
     @property
+    def rounded(self) -> NDArray[np.bool_]:
+        """Along which axes (n,) a corner was rounded."""
+        return np.asarray((self.corners != self.found[3:]).any(axis=0))
+
+    @property
     def exact(self) -> bool:
         """Whether it is bounded and full-dimensional, and nothing in its corners was rounded."""
-        (lower, upper), inner = self.corners, self.found[3:]
-        return bool((lower < upper).all() and (self.corners == inner).all() and self.bounded)
+        lower, upper = self.corners
+        return bool((lower < upper).all() and not self.rounded.any() and self.bounded)
 
     @property
     def vertices(self) -> Floats | None:
         """Its vertices (k, n) in lexicographic order; None if it is unbounded, one was rounded, or they are many."""
-        if self.point.size > _COORDINATES or not (self.corners == self.found[3:]).all() or not self.bounded:
+        if self.point.size > _COORDINATES or self.rounded.any() or not self.bounded:
             return None
         ends = [(u, v) if u < v else (u,) for u, v in self.corners.T.tolist()]
         return np.array(list(product(*ends)))

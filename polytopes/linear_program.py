@@ -272,14 +272,14 @@ class Program:
         with np.errstate(over="ignore"):  # rows far below one: those used are right, whatever their multipliers
             weights = np.ldexp(found.weights, program.row_powers + tops[:, None])
         multipliers[:, self.kept] = np.minimum(weights, np.finfo(np.float64).max)
+        inside = program._keeps(found.points)
         for q, name in enumerate(found.status):
             if name == UNBOUNDED and not self.thin:  # of a thin set, floats take an edge for a ray
                 values[q] = np.inf
-            elif name != OPTIMAL:
+            elif name != OPTIMAL or not inside[q]:
                 guess = lifted[q], multipliers[q]
-                answer = program._by_exact_multipliers(directions[q], *guess) or program._maximise_carefully(
-                    directions[q], reduced[q], tops[q]
-                )
+                answer = program._by_exact_multipliers(directions[q], *guess) if inside[q] else None
+                answer = answer or program._maximise_carefully(directions[q], reduced[q], tops[q])
                 found.status[q], values[q], lifted[q], multipliers[q] = answer
         return Maxima(values, lifted, multipliers, found.status)
 
@@ -319,6 +319,18 @@ class Program:
             if found.status[q] == OPTIMAL:
                 found.status[q] = UNDECIDED
         return values
+
+    def _keeps(self, points: Floats) -> NDArray[np.bool_]:
+        """Whether points (k, free) miss no row by more than is rounded or small beside the largest ball.
+
+        The bound at a point that does may be far above the maximum: sets may be thinner than the simplex method sees.
+        """
+        if not len(self.AT):
+            return np.full(len(points), True)
+        with np.errstate(over="ignore", invalid="ignore"):  # points of forms that are unbounded
+            terms = np.abs(points) @ np.abs(self.AT) + np.abs(self.rhs)
+            room = SHARP * max(self.interior.radius, 0.0) + (8.0 + len(self.AT)) * _EPS * terms
+            return np.asarray((points @ self.AT - self.rhs <= room).all(axis=1))
 
     @derived
     def errors(self) -> tuple[Floats, Floats]:

@@ -257,10 +257,10 @@ class Questions(Rows):
 
         In integers where the rows are short, or the set is flat or thin (and its vertices not too many), each rounded
         to the nearest floats.  Else along the edges from vertex to vertex, with a proof that all are found, where n
-        rows meet in each and no other row is nearer than 1e-9 of the size.  Else Qhull on the dual of the minimal rows,
-        then each vertex from its rows again; corners closer than 1e-9 of the size are one, and one
-        that is so near to the hull of the others may be left out.  The number of vertices, and the cost, grow as
-        m^(n/2).
+        rows meet in each and no other row is nearer than 1e-9 of the size.  Else by the double description in floats,
+        every sign told by a bound, or Qhull on the dual of the minimal rows, then each vertex from its rows again;
+        corners closer than 1e-9 of the size are one, and one that is so near to the hull of the others may be left out.
+        The number of vertices, and the cost, grow as m^(n/2).
 
         Parameters
         ----------

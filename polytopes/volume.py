@@ -1,19 +1,23 @@
 """The n-dimensional volume: that of the vertices by Qhull, in coordinates where the set is about round."""
 
+from fractions import Fraction
+
 import numpy as np
 from flint import fmpq, fmpq_mat
 
 from polytopes.affine_hull import affine_dim
+from polytopes.box import Box
 from polytopes.errors import UndecidedError
 from polytopes.exact import to_floats
 from polytopes.frame import unit_body
 from polytopes.general_position import summed_volume
+from polytopes.generators import exact_vertices
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.qhull import points_volume
 from polytopes.rows import Rows
 from polytopes.short_sets import short_volume
 from polytopes.support import is_bounded
-from polytopes.vertices import listed, vertices
+from polytopes.vertices import listed
 
 
 def volume(P: Rows) -> float:
@@ -25,8 +29,7 @@ def volume(P: Rows) -> float:
         If the set is too thin for such coordinates, and not computed with in integers.
     """
     if P.as_box is not None:
-        lower, upper = P.as_box.corners
-        return 0.0 if (lower == upper).any() else float(np.prod(upper - lower))
+        return _of_box(P, P.as_box)
     summed = _of_simplices(P)
     if summed is not None:
         return summed
@@ -35,7 +38,8 @@ def volume(P: Rows) -> float:
     if not is_bounded(P):
         return np.inf
     if P.dim == 1:
-        return float(np.ptp(vertices(P)))
+        ends = [point[0] for point in exact_vertices(P)]
+        return float(max(ends) - min(ends))
     if P.exact is not None:
         return _of_generators(P.exact)
     program = P.program.balanced
@@ -46,13 +50,22 @@ def volume(P: Rows) -> float:
     return float(points_volume(listed(body)) * size)
 
 
+def _of_box(P: Rows, box: Box) -> float:
+    """The product of its widths, of rationals where bounds were rounded."""
+    lower, upper = box.corners
+    widths = upper - lower
+    for j in np.flatnonzero(np.isfinite(widths) & box.rounded):
+        rows = zip(P.A[:, j].tolist(), P.b.tolist(), strict=True)
+        ends = [(a > 0.0, Fraction(side) / Fraction(a)) for a, side in rows if a]
+        widths[j] = float(min(end for above, end in ends if above) - max(end for above, end in ends if not above))
+    return 0.0 if (widths == 0.0).any() else float(np.prod(widths))
+
+
 def _of_simplices(P: Rows) -> float | None:
-    """The volume as a sum of those of simplices, where vertices and the rows that they lie on are certain."""
-    if P.d.size:
+    """The volume as a sum of those of simplices, where a ball fits in that is large beside their rounding."""
+    if P.prepared is None:
         return None
-    if P.short:
-        return short_volume(P.A, P.b)
-    return None if P.prepared is None else summed_volume(P.prepared)
+    return short_volume(P.A, P.b) if P.short else summed_volume(P.prepared)
 
 
 def _of_generators(P: ExactGenerators) -> float:

@@ -17,6 +17,7 @@ static const double BESIDE = 1e-9;      /* and on one that it does not lie on */
 static const double SURE = 0.25;        /* of ON: the bound of a ray that is known well enough */
 static const double INDEPENDENT = 1e-7; /* a row beside others: what is left of it across them */
 static const double SINGULAR = 1e-13;   /* pivot of rows that are dependent */
+static const double MOVED = 1e-10;      /* of a point: how far it may be from where rows that it lies on meet */
 
 typedef struct {
     integer d, m, words, room, count;
@@ -76,8 +77,8 @@ static int choose(Cone *cone, const uint64_t *among, integer many)
         cone->order[best] = cone->order[k], cone->order[k] = number, cone->basis[k] = number;
         const double inverse = 1.0 / sqrt(farthest);
         for (integer j = 0; j < d; j++) {
-            const double kept = axis[j];
-            axis[j] = other[j] * inverse, other[j] = kept;
+            const double chosen = other[j] * inverse;
+            other[j] = axis[j], axis[j] = chosen; /* in this order: they may be one */
         }
         for (integer i = k + 1; i < some; i++) {
             add_multiple(cone->left + i * d, -dot(axis, cone->left + i * d, d), axis, d);
@@ -281,20 +282,23 @@ integer near_points(integer d, integer m, const double *at, const double *centre
                     uint64_t *on, double *block)
 {
     Cone cone;
-    double *unit = block + lay_out(&cone, block, d, m, room);
+    double *unit = block + lay_out(&cone, block, d, m, room), *before = cone.left; /* whose rows are chosen by then */
     cone.rays = rays, cone.on = on;
     if (!centred_rows(&cone, at, centre, unit)) return UNCERTAIN;
     const integer count = describe(&cone);
     for (integer r = 0; r < count; r++) {
         double *ray = rays + r * d;
         if (lies_on(on + r * cone.words, m - 1) || !choose(&cone, on + r * cone.words, d - 1)) return UNCERTAIN;
-        for (integer j = 0; j < d - 1; j++) ray[j] = centre[j] + unit[j] * ray[j] / ray[d - 1];
+        const double t = ray[d - 1];
+        for (integer j = 0; j < d - 1; j++) before[j] = ray[j] = centre[j] + unit[j] * ray[j] / t;
         ray[d - 1] = 1.0;
         for (integer k = 0; k < d; k++)
             for (integer j = 0; j < d; j++)
                 cone.work[k * 2 * d + j] = k < d - 1 ? at[j * m + cone.basis[k]] : ray[j];
         if (!invert(cone.work, d, SINGULAR, cone.inverse)) return UNCERTAIN;
         to_point(d, m, at, cone.basis, cone.inverse, cone.work, ray);
+        for (integer j = 0; j < d - 1; j++)
+            if (!(fabs(ray[j] - before[j]) <= MOVED * unit[j] / t)) return UNCERTAIN;
     }
     return count;
 }

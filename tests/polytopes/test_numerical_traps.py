@@ -187,3 +187,19 @@ def test_support_points_that_tell_no_width(value: float) -> None:
     centre = np.zeros(2)
     with pytest.raises(UndecidedError, match="too thin"):
         unit_frame(lambda directions: np.full((len(directions), 2), value), centre)
+
+
+def test_supports_of_sets_thinner_than_the_simplex_method_sees_are_near() -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(30):
+        n = int(rng.integers(2, 5))
+        A = np.vstack([rng.integers(-8, 9, (6, n)) / 8.0, np.eye(n), -np.eye(n), -np.eye(n)[:1]])
+        b = np.r_[rng.integers(2, 25, 6) / 8.0, np.full(2 * n, 3.0), -3.0 + 10.0 ** -float(rng.integers(11, 15))]
+        P = HPolytope(A, b)
+        if P.is_empty():
+            continue
+        directions = np.vstack([np.eye(n), -np.eye(n), rng.standard_normal((4, n))])
+        exact = np.array([float(v) for v in P.support(directions, exact=True)])
+        found = P.support(directions)
+        assert (found >= exact - 1e-15).all()
+        assert (found - exact).max() < 1e-11

@@ -148,3 +148,41 @@ def test_volumes_of_short_sets_are_right() -> None:
     assert found > 15
     assert short_volume(np.vstack([np.eye(9), -np.eye(9)]), np.ones(18)) is None  # 9! simplices
     assert HPolytope.cross_polytope(5).volume() == pytest.approx(2.0**5 / 120.0, rel=1e-14)
+
+
+def test_volumes_of_flat_and_thin_sets_are_right() -> None:
+    rng, flat, thin = np.random.default_rng(6), 0, 0
+    for _ in range(40):
+        A, b = short_rows(rng)
+        A, b, n = A[: len(b)], b[: len(A)], A.shape[1]
+        row, side = rng.integers(-3, 4, n).astype(float), float(rng.integers(0, 3))
+        thickness = float(rng.choice([0.0, 2.0**-20, 2.0**-30]))
+        A, b = np.vstack([A, 3.0 * row, -3.0 * row]), np.r_[b, side, thickness - side]
+        exact = HPolytope(A, b).volume(exact=True)
+        assert HPolytope(A, b).volume() == pytest.approx(float(exact), rel=1e-9, abs=0.0)
+        flat, thin = flat + (exact == 0), thin + (thickness > 0.0 and 0 < exact < np.inf)
+    assert flat > 5
+    assert thin > 2
+    near = HPolytope([[2.0**31 - 1], [-(2.0**31 - 3)]], [2.0**30, -(2.0**30 - 1)])  # ends that are one float
+    assert near.volume() == pytest.approx(float(near.volume(exact=True)), rel=1e-15)
+    assert HPolytope([[3.0, 0.0], [-3.0, 0.0], [0.0, 1.0]], [1.0, -1.0, 1.0]).volume() == 0.0
+    slab = HPolytope([[0.1, 0.0], [-0.1, 0.0], [0.0, 1.0], [0.0, -1.0]], [0.1, -0.1 + 2.0**-52, 1.0, 1.0])
+    assert slab.volume() == pytest.approx(float(slab.volume(exact=True)), rel=1e-15)
+
+
+def test_no_vertex_is_where_rows_that_nearly_depend_on_each_other_meet() -> None:
+    rng, found = np.random.default_rng(7), 0
+    for _ in range(20):
+        n = int(rng.integers(3, 5))
+        A = np.vstack([rng.integers(-3, 4, (n, n)), np.eye(n), -np.eye(n)])
+        b = np.r_[rng.integers(1, 4, n), np.full(2 * n, 0.7)]
+        for _ in range(2):
+            i, j = rng.integers(len(b), size=2)
+            A, b = np.vstack([A, A[i] + A[j]]), np.r_[b, b[i] + b[j] - 1e-11]
+        P = HPolytope(A, b)
+        if P.listed is None:
+            continue
+        found += 1
+        assert (P.A @ P.vertices().T - P.b[:, None]).max() < 1e-9
+        assert P.volume() == pytest.approx(float(P.volume(exact=True)), rel=1e-9)
+    assert found > 8
