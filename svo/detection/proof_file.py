@@ -6,11 +6,12 @@ import json
 import os
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from svo.isolation import Alarm
-from svo.store.packed_lines import is_packed, members_of, packed
+from svo.store.packed_lines import members_of, packed
 
 FORMAT = "svo-proof-1"
 
@@ -52,6 +53,7 @@ class ProofFile:
             {"format": FORMAT} | {k: source[k] for k in ("plant", "noise", "architecture") if k in source}
         )
         self._kept: list[bytes] = []
+        self._whole = 0  # bytes of the members that are
         self.chains = 0
         if path.exists():
             self._read()
@@ -70,31 +72,46 @@ class ProofFile:
                 raise ValueError(f"{self._path} has another proof of {chain.alarm.observer!r}; give another name")
         else:
             with self._path.open("ab") as file:
-                file.write(packed(text) if self.chains or self._kept else packed(self._head) + packed(text))
+                file.truncate(self._whole)
+                file.write(packed(text) if self._whole else packed(self._head) + packed(text))
                 file.flush()
                 os.fsync(file.fileno())
+                self._whole = file.tell()
         self.chains += 1
 
     def close(self) -> None:
         """Raise ValueError if the file has more chains than were added."""
         if self.chains < len(self._kept):
             raise ValueError(f"{self._path} has proofs of other alarms than these; give another name")
+        if self._whole < self._path.stat().st_size:
+            os.truncate(self._path, self._whole)
 
     def _read(self) -> None:
-        """The whole members; one that was cut off is dropped."""
-        size, found = 0, list[bytes]()
-        if not is_packed(self._path):
-            raise ValueError(f"{self._path} exists, and is no proof of these alarms; give another name")
-        try:
+        """The whole members; what follows them stays until a chain is proven to stand in its place."""
+        if not self._is_begun():
+            return
+        found = list[bytes]()
+        with suppress(ValueError, zlib.error):
             for raw, content in members_of(self._path):
-                size += len(raw)
+                self._whole += len(raw)
                 found.append(content)
-        except (ValueError, zlib.error):
-            pass
-        if not found or found[0] != self._head:
-            raise ValueError(f"{self._path} exists, and is no proof of these alarms; give another name")
-        os.truncate(self._path, size)
         self._kept = found[1:]
+
+    def _is_begun(self) -> bool:
+        """Whether the first member is that of these alarms; False if it was cut off.
+
+        No more is unpacked than it takes: the file may be anything.
+        """
+        head = packed(self._head)
+        with self._path.open("rb") as file:
+            first = file.read(2 * len(head) + 64)
+        if len(first) < len(head) and head.startswith(first):
+            return False
+        member = zlib.decompressobj(31)
+        with suppress(zlib.error):
+            if member.decompress(first, len(self._head) + 1) == self._head and member.eof:
+                return True
+        raise ValueError(f"{self._path} exists, and is no proof of these alarms; give another name")
 
 
 def _lines(chain: Chain) -> Iterator[dict[str, Any]]:

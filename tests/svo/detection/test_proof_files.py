@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from typer.testing import CliRunner
 from svo import UncertainModel, Uncertainty, detect, find_plant, read_log, verify
 from svo.cli import app
 from svo.detection.plant_record import plant_record
+from svo.store.packed_lines import members_of
 from tests.svo.observers.long_chains import long_chains
 
 CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
@@ -119,13 +121,29 @@ def test_an_interrupted_proof_is_gone_on_with_and_nothing_in_it_is_believed(tmp_
     assert done == [(1, 2), (1, 2), (2, 2)]
     assert proof.read_bytes().startswith(first)
     assert len(of_kind(steps_of(proof), "alarm")) == 2
-    whole = steps_of(proof)
+    whole, written = steps_of(proof), proof.read_bytes()
+    begun = len(next(members_of(proof))[0])
+    for end in (0, 7, begun, begun + 30, len(first) + 30, len(written) - 1):
+        proof.write_bytes(written[:end])  # also within the first line, after it, and within the first chain
+        assert verify(found, full=True, write_proof=proof).ok
+        assert proof.read_bytes() == written
     for content in (b"other", gzip.compress(b"{}\n"), first + gzip.compress(b'{"step": "alarm"}\n')):
         (other := tmp_path / "other").write_bytes(content)
         with pytest.raises(ValueError, match="give another name"):
             verify(found, full=True, write_proof=other)
         assert other.read_bytes() == content
     assert steps_of(proof) == whole
+
+
+def test_a_proof_of_another_log_loses_nothing_though_it_was_cut_off(tmp_path: Path) -> None:
+    log, plant = CART.with_suffix(".csv"), find_plant(str(CART))
+    data, proof = read_log(log, plant), tmp_path / "proof.jsonl.gz"
+    assert verify(detect(plant, data), full=True, write_proof=proof).ok
+    proof.write_bytes(content := proof.read_bytes()[:-9])
+    other = detect(plant, replace(data, y=data.y + 1e-3 * (np.arange(len(data)) > 30)[:, None]))
+    with pytest.raises(ValueError, match="another proof of .*; give another name"):
+        verify(other, full=True, write_proof=proof)
+    assert proof.read_bytes() == content
 
 
 def test_a_scheduled_plant_is_described_with_its_log(tmp_path: Path) -> None:
