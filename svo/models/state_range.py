@@ -30,14 +30,17 @@ class StateRange(Value):
         return bool(np.isfinite(self.lower).all() and np.isfinite(self.upper).all())
 
     def cut(self, lower: Array, upper: Array) -> tuple[Array, Array, bool]:
-        """A box within the range, and whether they meet. Where they do not, the box stays as it is, which is sound."""
-        low, high = np.maximum(lower, self.lower), np.minimum(upper, self.upper)
+        """A box within the range, and whether they meet. Where they do not, the box stays as it is, which is sound.
+
+        Of equal ends the range's is taken, which tells zeros apart, as the core takes it.
+        """
+        low, high = np.where(lower > self.lower, lower, self.lower), np.where(upper < self.upper, upper, self.upper)
         meets = low <= high
         return np.where(meets, low, lower), np.where(meets, high, upper), bool(meets.all())
 
     def along(self, directions: Array) -> StateRange:
         """Bounds of d'x over the range, for directions d (k, n)."""
-        return StateRange(-self.support(-directions), self.support(directions))
+        return StateRange(0.0 - self.support(-directions), 0.0 + self.support(directions))
 
     def support(self, directions: Array) -> Array:
         """Largest d'x over the range, for directions (k, n), rounded up; infinite where nothing bounds it."""
@@ -77,7 +80,7 @@ def state_range(name: str, value: Any, n: int, bounded: bool) -> StateRange | No
     wanted += ", all finite" if bounded else "; -inf or inf where there is no bound"
     expect(isinstance(value, tuple | list) and len(value) == 2, name, value, wanted)
     given = (real_array(f"{name}[{i}]", end, (), (n,), meaning=wanted, finite=False) for i, end in enumerate(value))
-    ends = lower, upper = [np.full(n, end) for end in given]
+    ends = lower, upper = [np.full(n, end) + 0.0 for end in given]  # no zero is negative
     if not ((lower <= upper) & (lower < np.inf) & (upper > -np.inf)).all():
         raise ValueError(f"{name} is between {lower} and {upper}; expected {wanted}")
     found = StateRange(lower, upper)

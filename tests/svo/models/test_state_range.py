@@ -77,3 +77,15 @@ def test_a_range_of_the_state_goes_through_the_door_for_numbers(name: str, bound
     """A masked end was read as data, and an imaginary part was dropped."""
     with pytest.raises((TypeError, ValueError), match=rf"^{name}\[1\]"):
         UncertainModel(np.eye(2), None, np.eye(2), **{name: ([-9e9, -9e9], bound)})
+
+
+def test_a_zero_end_of_a_range_is_the_same_zero_however_it_is_reached() -> None:
+    """Boxes of steps and of logs that the core follows are compared to the bit."""
+    model = UncertainModel(0.9 * np.eye(2), None, [[1.0, 0.0]], physical=([0.0, -0.0], [-0.0, 3.0]))
+    physical = model.physical_range
+    assert physical is not None
+    for of in (physical, physical.along(np.array([[1.0, 0.0], [0.0, 1.0]]))):
+        for zero in (0.0, -0.0):
+            lower, upper, meets = of.cut(np.array([-1.0, zero]), np.array([zero, 5.0]))
+            assert meets
+            assert not np.signbit([*lower, *upper]).any()
