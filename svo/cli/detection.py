@@ -172,7 +172,7 @@ def watch(
         from svo.detection.watch.json_view import JsonView
         from svo.detection.watch.session import Session, identity_of
         from svo.detection.watch.silence import Silence
-        from svo.detection.watch.state import resume_state, save_state
+        from svo.detection.watch.state import check_replaced, resume_state, save_state
         from svo.detection.watch.view import view_of
         from svo.detection.watch.watch import watch as run_watch
         from svo.plant.description import check_kept_description, keep_description
@@ -183,6 +183,8 @@ def watch(
         session = Session(the_plant, noise, lines.name)
         identity = identity_of(the_plant, noise, log)
         keep = save = None
+        if state is not None and writable_file(state) and state.exists() and overwrite:
+            check_replaced(state)
         if out is not None:
             if not overwrite:
                 check_kept_description(the_plant, out)
@@ -194,7 +196,6 @@ def watch(
                 note(f"{alarms.alarms} keeps its {alarms.before} alarms of before")
             keep = alarms.add
         if state is not None:
-            writable_file(state)
             if state.exists() and not overwrite:
                 resume_state(state, session, lines, identity)
             save = partial(save_state, state, session, lines, identity)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import svo as face
-from svo.cli.destinations import check_new
+from svo.cli.destinations import check_new, writable_file
 from svo.cli.frame import app, chosen_noise, one_line_errors
 from svo.cli.options import Architecture, AsJson, DescribedName, Models, NoiseName, Overwrite
 from svo.cli.output import print_checks, print_json, say
@@ -76,7 +76,7 @@ def verify(
 @one_line_errors()
 def describe(
     plant: DescribedName,
-    out: Annotated[Path, typer.Option(metavar="PLANT.json", help="File to write.")],
+    out: Annotated[Path, typer.Option(metavar="PLANT.json", callback=writable_file, help="File to write.")],
     noise: NoiseName = None,
     log: Annotated[
         Path | None,
@@ -96,12 +96,13 @@ def describe(
     Example:
       svo describe eclipse --models lpv --log flight.csv --out plant.json
     """
-    from svo.detection.plant_record import plant_record
+    from svo.detection.plant_record import check_replaced, plant_record
     from svo.plant import BankChoice, with_bank
     from svo.store import write_text
     from svo.terminal import json_text
 
     check_new(out, overwrite)
+    check_replaced(out)
     found = with_bank(face.find_plant(plant), BankChoice(architecture, models))
     data = None if log is None else face.read_log(log, found)
     record = plant_record(found, chosen_noise(found, noise), data)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,18 @@ def plant_record(plant: MonitoredPlant, noise: str, log: Log | None = None) -> d
         "observers": observers,
         **({} if log is None or not log.keeps_its_times else {"intervals": encode_value(np.diff(log.time))}),
     }
+
+
+def check_replaced(path: Path) -> None:
+    """ValueError if a file exists that is no such record: a log or a description is not overwritten."""
+    if not path.exists():
+        return
+    start = f'{{"format": "{FORMAT}"'.encode()
+    with path.open("rb") as file:
+        if file.read(len(start)) != start:
+            raise ValueError(
+                f"{path} is none of `svo describe` (format {FORMAT}); give another name, it is not overwritten"
+            )
 
 
 def _observers(bank: Bank, log: Log | None) -> dict[str, Any]:

@@ -66,13 +66,23 @@ def resume_state(path: Path, session: Session, lines: Lines, identity: Mapping[s
         ) from error
 
 
-def _checked(path: Path, content: bytes) -> bytes:
-    """What follows the digest, if that is right."""
-    head, _, rest = content.partition(b"\n")
+def check_replaced(path: Path) -> None:
+    """ValueError unless a file is the state of a watch, whole or damaged: nothing else is overwritten."""
+    with path.open("rb") as file:
+        _check_head(path, file.read(len(_FORMAT) + 1))
+
+
+def _check_head(path: Path, head: bytes) -> None:
     if not head.startswith(_FORMAT.encode() + b" "):
         raise ValueError(
             f"{path} is not the state of a watch (format {_FORMAT}); give another file, it is not overwritten"
         )
+
+
+def _checked(path: Path, content: bytes) -> bytes:
+    """What follows the digest, if that is right."""
+    head, _, rest = content.partition(b"\n")
+    _check_head(path, head)
     if head.split()[1:] != [hashlib.sha256(rest).hexdigest().encode()]:
         raise ValueError(f"{path} is damaged: its SHA-256 does not match; remove it to begin anew")
     return rest

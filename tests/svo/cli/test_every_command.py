@@ -144,6 +144,19 @@ def test_only_results_of_the_same_command_are_replaced(
     assert content(tmp_path) == before
 
 
+def test_a_description_of_models_replaces_nothing_else(tmp_path: Path) -> None:
+    for source in (CART, LOG):
+        (path := tmp_path / source.name).write_bytes(content := source.read_bytes())
+        read = [path] if source is CART else [CART, "--log", path]
+        assert "is not overwritten" in refused(svo("describe", *read, "--out", path, "--overwrite"))
+        assert path.read_bytes() == content
+    assert f"there is no folder {tmp_path / 'no'}" in refused(
+        svo("describe", CART, "--out", tmp_path / "no" / "a.json")
+    )
+    for _ in range(2):
+        assert svo("describe", CART, "--out", tmp_path / "plant.json", "--overwrite").exit_code == 0
+
+
 def test_files_of_somebody_else_in_a_study_are_not_removed(registered_tank: str, tmp_path: Path) -> None:
     assert svo(*study(tmp_path)).exit_code == 0
     (tmp_path / "thesis.tex").write_text("mine")

@@ -141,7 +141,7 @@ def test_a_proof_of_another_log_loses_nothing_though_it_was_cut_off(tmp_path: Pa
     assert verify(detect(plant, data), full=True, write_proof=proof).ok
     proof.write_bytes(content := proof.read_bytes()[:-9])
     other = detect(plant, replace(data, y=data.y + 1e-3 * (np.arange(len(data)) > 30)[:, None]))
-    with pytest.raises(ValueError, match="another proof of .*; give another name"):
+    with pytest.raises(ValueError, match=r"another proof of .*; give another name"):
         verify(other, full=True, write_proof=proof)
     assert proof.read_bytes() == content
 

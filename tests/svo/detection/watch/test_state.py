@@ -121,6 +121,20 @@ def refusal(tmp_path: Path, plant: Path = CART, log: str = "log.csv") -> str:
     return str(error)
 
 
+def test_only_a_state_is_replaced_on_demand(tmp_path: Path, state: Path) -> None:
+    log, out, whole = tmp_path / "log.csv", tmp_path / "out", state.read_bytes()
+    assert svo("watch", CART, log, "--until-end", "--out", out).exit_code == 0
+    alarms = (out / "alarms.jsonl").read_bytes()
+    result = svo("watch", CART, log, "--until-end", "--out", out, "--state", log, "--overwrite")
+    assert result.exit_code == 1
+    assert "log.csv is not the state of a watch" in result.stderr
+    assert log.read_text() == TEXT
+    assert (out / "alarms.jsonl").read_bytes() == alarms
+    state.write_bytes(whole[:-9])
+    assert svo("watch", CART, log, "--until-end", "--state", state, "--overwrite").exit_code == 0
+    assert svo("watch", CART, log, "--until-end", "--state", state).exit_code == 0  # it goes on from it
+
+
 def test_a_damaged_state_is_refused_and_stays(tmp_path: Path, state: Path) -> None:
     whole = state.read_bytes()
     rng = np.random.default_rng(0)
