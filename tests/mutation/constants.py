@@ -113,7 +113,7 @@ CONSTANTS = (
             "polytopes/elimination.c": ("LONG", "GROWTH", "CANCELLED"),
             "polytopes/centre.c": ("ROUNDED_SLACK",),
             "polytopes/cone.c": ("DEPENDENT",),
-            "polytopes/near_cone.c": ("ON", "BESIDE", "SURE", "INDEPENDENT", "SINGULAR"),
+            "polytopes/near_cone.c": ("ON", "BESIDE", "SURE", "INDEPENDENT", "SINGULAR", "MOVED"),
             "polytopes/bounded_sets.c": ("NARROW", "STEEP"),
             "polytopes/volume.c": ("STEPS",),
             "polytopes/questions.c": ("MANY", "TIGHT"),
