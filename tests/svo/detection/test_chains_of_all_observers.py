@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from proof_cases import Made, answer, proven, random_plant, steps_of
+from scipy.linalg import expm
 
 from svo import ConstrainedZonotopeObserver, Log, PolytopeObserver, UncertainModel, Uncertainty, WindowObserver
 
+OSCILLATOR = np.array([[0.0, 1.0], [-1.0, -0.2]])
 OTHERS = (ConstrainedZonotopeObserver, PolytopeObserver)
 
 
@@ -28,7 +31,7 @@ def test_alarms_of_other_observers_are_proven(kind: Any, seed: int, tmp_path: Pa
 def events(rng: np.random.Generator) -> tuple[Made, Log]:
     """An oscillator that is read at times of its own, and whose sensor jumps."""
     model = UncertainModel.from_continuous(
-        [[0.0, 1.0], [-1.0, -0.2]], [[0.0], [1.0]], [[1.0, 0.0]], E=[[0.0], [1.0]], w=[0.1], n=[0.05], Ts=0.1,
+        OSCILLATOR, [[0.0], [1.0]], [[1.0, 0.0]], E=[[0.0], [1.0]], w=[0.1], n=[0.05], Ts=0.1,
         uncertainties=[Uncertainty(A=[[0.0, 0.0], [0.1, 0.0]])], remainder={"states": [4.0, 4.0], "inputs": [1.0]},
     )  # fmt: skip
     time = np.cumsum(rng.uniform(0.02, 0.3, 60))
@@ -51,6 +54,10 @@ def test_logs_with_times_of_their_own_are_proven(kind: Any, tmp_path: Path) -> N
     code, text = answer(*files)
     assert code == 0, text
     assert "AXIOM" in text  # the matrices of each sample
+    stacks = json.loads(files[1].read_text())["observers"]["nominal"]["matrices"]["stacks"]
+    stated = np.array([float.fromhex(word) for word in stacks["hex"].split()]).reshape(stacks["shape"])
+    for k, dt in enumerate(np.diff(log.time)):
+        np.testing.assert_allclose(stated[k, 0, :2, :2], expm(OSCILLATOR * dt), rtol=1e-12)
     sample = next(step for step in steps_of(files[0]) if step.get("step") == "chain")["sample"]
     assert sample >= 40
     # at other times the matrices are others: a reading moved by a microsecond is refused

@@ -21,9 +21,12 @@ from svo import ArchitectureI, NonlinearModel, WindowObserver, find_plant, prove
 from svo.cli import app
 from svo.detection.plant_record import observer_record
 from svo.logs.log import Log
+from svo.observers import window_kernel
 from svo.observers.window.chain_starts import own_start
-from svo.observers.window.linearised_prover import LinearisedProver
+from svo.observers.window.linearised_prover import LinearisedProver, _Run
+from svo.observers.window.memory import Memory
 from svo.observers.window.prover import ProvenChain
+from svo.observers.window.window import Window
 from svo.store.values import encode_value
 from tests.svo.models.nonlinear_plants import CASES, Case
 
@@ -305,6 +308,40 @@ def test_a_drift_that_is_just_found_is_proven(name: str, seed: int) -> None:
     found = chain_of(observer, log, at)
     assert found is not None
     assert is_checked(found, observer, log, at)
+
+
+def test_a_bound_of_the_newest_state_that_is_too_tight_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    observer, log, at = drifting("pendulum", 7)
+    assert at is not None
+    honest = Memory.solve
+
+    def solve(self: Memory, task: int, program: int, *limits: int) -> Any:
+        found = honest(self, task, program, *limits)
+        if task == window_kernel.NEWEST and program % 2 == 0:
+            self.arrays["now_upper"][program // 2] -= 1e-6
+        return found
+
+    monkeypatch.setattr(Memory, "solve", solve)
+    found = chain_of(observer, log, at)
+    assert found is None or is_checked(found, observer, log, at)
+
+
+def test_a_set_to_go_on_from_that_is_too_tight_is_not_proven(monkeypatch: pytest.MonkeyPatch) -> None:
+    observer, log, at = drifting("pendulum", 7)
+    assert at is not None
+    honest = _Run.arrival
+
+    def arrival(self: _Run, window: Window, program: int) -> None:
+        if program == 0:
+            window.memory.arrays["new_upper"][0] -= 1e-6
+        honest(self, window, program)
+
+    monkeypatch.setattr(_Run, "arrival", arrival)
+    first = observer.first_set
+    assert first is not None
+    prover = LinearisedProver(observer.model, log, 0, own_start(None, first))
+    assert prover.prove(at) is None
+    assert "is not proven" in prover.reason
 
 
 def test_a_chain_of_an_observer_alone_is_proven() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from test_checker_on_trajectories import CHECK, SAMPLES, Trajectory, array, exact
 
-from svo.observers.window.chain_starts import from_readings
+from svo.models.state_range import StateRange
+from svo.observers.window.chain_starts import from_readings, own_start
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_model import ModelOnLog
 from tests.svo.observers.random_plants import random_plant
@@ -91,3 +92,17 @@ def test_the_box_that_the_prover_finds_holds_the_state(seeds: range) -> None:
                 assert (log.x[sample] <= start.set.box_upper).all(), seed
                 found += 1
     assert found > len(seeds) / 2
+
+
+@pytest.mark.parametrize(("largest_at", "since", "kind"), [
+    (None, 0, "first"), (None, 3, None), (2, 0, "largest"), (2, 3, "largest"), (-1, 3, None), (-1, 0, "first"),
+])  # fmt: skip
+def test_an_observer_began_with_a_set_that_the_model_states_or_with_one_that_was_given(
+    largest_at: int | None, since: int, kind: str | None
+) -> None:
+    largest, first = StateRange(np.array([-9.0]), np.array([9.0])), ArrivalSet.box(np.zeros(1), np.ones(1))
+    start = own_start(largest, first, largest_at, since)
+    assert (start and start.kind) == kind
+    if start is not None:
+        assert start.sample == (since + 2 if kind == "largest" else 0)
+        assert start.set.box_upper == (9.0 if kind == "largest" else 1.0)

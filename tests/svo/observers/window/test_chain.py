@@ -70,21 +70,40 @@ def test_a_bound_that_is_too_tight_is_not_proven(monkeypatch: pytest.MonkeyPatch
     assert any("arrival bound 0" in what for what in chain.unproven)
 
 
-def test_bounds_of_channels_are_counted_and_proven() -> None:
+def with_a_channel() -> tuple[WindowObserver, Log]:
+    """A plant with one uncertainty of state and disturbance, and a log whose sensor jumps at sample 20."""
     model = UncertainModel(
         [[0.95, 0.1], [-0.1, 0.9]], None, np.eye(2), E=np.eye(2), w=[0.02, 0.02], n=[0.05, 0.05],
-        uncertainties=[Uncertainty(A=[[0.0, 0.0], [0.2, 0.1]])],
+        uncertainties=[Uncertainty(A=[[0.0, 0.0], [0.2, 0.1]], E=[[0.0, 0.0], [0.3, -0.2]])],
     )  # fmt: skip
-    rng = np.random.default_rng(1)
-    log = model.simulate([0.3, -0.3], np.zeros((25, 0)), rng)
+    log = model.simulate([0.3, -0.3], np.zeros((25, 0)), np.random.default_rng(1))
     y = log.y.copy()
     y[20:, 0] += 1.0
-    chain = prove_chain(WindowObserver(model, HPolytope.box([-1, -1], [1, 1]), horizon=4), Log(log.time, log.u, y))
+    return WindowObserver(model, HPolytope.box([-1, -1], [1, 1]), horizon=4), Log(log.time, log.u, y)
+
+
+def test_bounds_of_channels_are_counted_and_proven() -> None:
+    chain = prove_chain(*with_a_channel())
     assert chain.proven
     assert chain.falsified_at == 20
     assert chain.bounds >= 8  # two of the channel at each transition
     assert chain.certificate is not None
     assert chain.certificate.verify()
+
+
+def test_a_bound_of_a_channel_that_is_too_tight_is_not_proven(monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = prover.BoundProver.channel
+
+    def check_after_cheating(self: prover.BoundProver, window: Window, q: int, side: int, is_open: bool) -> None:
+        memory, sign = window.memory, 1 - 2 * side
+        memory.arrays["s_lower" if side else "s_upper"][memory.variables, q] -= sign * 1e-6
+        honest(self, window, q, side, is_open)
+
+    monkeypatch.setattr(prover.BoundProver, "channel", check_after_cheating)
+    chain = prove_chain(*with_a_channel())
+    assert not chain.proven
+    for side in ("lower", "upper"):
+        assert any(f"{side} bound of s of channel 0" in what for what in chain.unproven)
 
 
 def test_a_healthy_log_proves_its_bounds_and_no_alarm() -> None:
