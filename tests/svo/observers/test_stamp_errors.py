@@ -91,6 +91,15 @@ def test_a_reading_is_worth_the_same_to_each_observer(kind: Any) -> None:
     assert boxes[0][1, 0] == pytest.approx(0.01 + 0.1 * 1.01, rel=1e-6)  # speed within 1, force within 0.1 for 0.1 s
 
 
+@pytest.mark.parametrize("kind", [WindowObserver, *OTHERS])
+def test_a_disturbance_of_one_side_in_an_output_is_taken_out_about_its_middle(kind: Any) -> None:
+    """y = 1000 (x + w): with w from 0.2 to 0.4, y = 500 says that x is between 0.1 and 0.3."""
+    output: dict[str, Any] = {"C": [[1000.0, 0.0], [0.0, 1.0]], "F": [[1000.0], [0.0]], "n": [10.0, 0.5]}
+    observer = kind(cart(jitter=[1e-9, 0.0], w=([0.2], [0.4]), **output), FIRST)
+    box = np.array(observer.update([500.0, np.nan], u=[0.0]).box)
+    assert box[:, 0] == pytest.approx([0.09, 0.31], rel=1e-6)
+
+
 @pytest.mark.parametrize("kind", OTHERS)
 def test_other_observers_lose_and_find_their_set(kind: Any) -> None:
     lost = kind(cart(jitter=[0.1, 0.0]), FIRST)
@@ -281,8 +290,9 @@ def test_a_saved_state_goes_on_bit_for_bit(kind: str, of: Any) -> None:
         of.from_state_dict(case.model.replace(n=2.0 * np.asarray(case.model.n)), cut.state_dict())
 
 
-def test_a_set_that_is_lost_has_no_reading_whose_stamp_is_off() -> None:
-    observer = WindowObserver(cart(jitter=[0.1, 0.0]), FIRST)
+@pytest.mark.parametrize("physical", [None, ([-5.0, -np.inf], [5.0, np.inf])])  # of which the speed is not bounded
+def test_a_set_that_is_lost_has_no_reading_whose_stamp_is_off(physical: Any) -> None:
+    observer = WindowObserver(cart(jitter=[0.1, 0.0], physical=physical), FIRST)
     observer.lose_set()
     verdicts = [step.verdict for step in drive(observer, Log(0.5 * np.arange(6), np.zeros((6, 1)), np.zeros((6, 2))))]
     assert set(verdicts) == {"undecided"}  # the position is read by a sensor without a stamp of use
