@@ -73,10 +73,8 @@ class Carried:
 
     Attributes
     ----------
-    box : Span
-        Of the newest state.
-    now, before : Linearisation
-        Of the newest sample, without a transition, and of the one before it.
+    box, now, before : Span, Linearisation, Linearisation
+        As `svo.observers.window.relinearised.Relinearised` has them, whether there are such samples or not.
     result, why : (2,) int, (8,) arrays
         How the last call ended.
     address : int

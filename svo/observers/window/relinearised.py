@@ -33,32 +33,31 @@ class Relinearised:
 
     Attributes
     ----------
-    box : Span
-        Known of the newest state besides what the window knows.
     reason : str or None
         Why the newest sample was not linearised.
-    now, before : Linearisation or None
-        Of the newest sample, which has no transition yet, and of the one before it.
     """
 
+    reason: str | None = None
+
     def __init__(self, model: NonlinearModel) -> None:
-        self.model, self.reason = model, None
+        self.model = model
         self._carried = Carried(model)
         self._has_now = self._has_before = False
         self.start_from(Span(model.start_range.lower, model.start_range.upper))
 
-    reason: str | None
-
     @property
     def box(self) -> Span:
+        """Known of the newest state besides what the window knows."""
         return self._carried.box
 
     @property
     def now(self) -> Linearisation | None:
+        """Of the newest sample, which has no transition yet; None before there is one."""
         return self._carried.now if self._has_now else None
 
     @property
     def before(self) -> Linearisation | None:
+        """Of the one before it, with the transition from it."""
         return self._carried.before if self._has_before else None
 
     def connect(self, form: NormalForm) -> None:
