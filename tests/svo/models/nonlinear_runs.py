@@ -116,8 +116,8 @@ class _Move(NamedTuple):
 
 def _check_move(observer: WindowObserver, one: Runs, k: int, lost: Array, found: Findings, where: str) -> None:
     """The true transition from sample k against that which the observer made of it, and what it carries along."""
-    assert observer._plant is not None
-    model, box = observer._plant.model, observer._plant.box
+    assert observer._sampler.plant is not None
+    model, box = observer._sampler.plant.model, observer._sampler.plant.box
     before, _ = observer.linearised
     if k + 1 >= len(one.x) or before is None:
         return

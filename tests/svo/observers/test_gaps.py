@@ -19,7 +19,7 @@ def lost(model: UncertainModel, horizon: int | None, **options: Any) -> WindowOb
     """An observer whose set is gone: by an input that no float can follow, then by nothing read."""
     observer = WindowObserver(model, start(model), horizon=horizon, **options)
     observer.update(np.full(model.n_outputs, np.nan))
-    observer._lose()
+    observer._known.lose()
     return observer
 
 
@@ -155,7 +155,7 @@ def test_a_bad_sample_leaves_a_lost_observer_unchanged() -> None:
     model = UncertainModel([[0.9]], [[1.0]], [[1.0]], n=0.1)
     observer = WindowObserver(model, start(model))
     observer.update([0.0])
-    observer._lose()
+    observer._known.lose()
     before = {name: value.tobytes() for name, value in observer.state_dict().items()}
     for u, y in (([np.nan], [0.0]), ([0.0], [np.inf]), ([0.0, 1.0], [0.0])):
         with pytest.raises(ValueError, match="expected"):
@@ -289,7 +289,7 @@ def test_with_and_without_a_gap_the_sets_are_alike_soon_after(uncertain: bool) -
         gone.update(y[0])
         for k in range(1, len(y)):
             if k == 40:
-                gone._lose()
+                gone._known.lose()
             a, b = without.step(None, y[k]), gone.step(None, y[k])
             assert (b.box[0] <= x[k]).all()
             assert (x[k] <= b.box[1]).all()

@@ -292,10 +292,12 @@ def test_a_saved_state_goes_on_bit_for_bit(kind: str, of: Any) -> None:
 
 @pytest.mark.parametrize("physical", [None, ([-5.0, -np.inf], [5.0, np.inf])])  # of which the speed is not bounded
 def test_a_set_that_is_lost_has_no_reading_whose_stamp_is_off(physical: Any) -> None:
-    observer = WindowObserver(cart(jitter=[0.1, 0.0], physical=physical), FIRST)
+    model = cart(jitter=[0.1, 0.0], physical=physical)
+    observer = WindowObserver(model, FIRST)
     observer.lose_set()
-    verdicts = [step.verdict for step in drive(observer, Log(0.5 * np.arange(6), np.zeros((6, 1)), np.zeros((6, 2))))]
-    assert set(verdicts) == {"undecided"}  # the position is read by a sensor without a stamp of use
+    for lost in (WindowObserver.from_state_dict(model, observer.state_dict()), observer):
+        verdicts = [step.verdict for step in drive(lost, Log(0.5 * np.arange(6), np.zeros((6, 1)), np.zeros((6, 2))))]
+        assert set(verdicts) == {"undecided"}  # the position is read by a sensor without a stamp of use
     known = WindowObserver(cart(jitter=[0.1, 0.0], largest=([-9, -9], [9, 9])), FIRST)
     known.lose_set()
     assert known.run(Log(0.5 * np.arange(6), np.zeros((6, 1)), np.zeros((6, 2)))).verdicts[-1] == "consistent"
