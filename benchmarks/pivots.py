@@ -61,7 +61,7 @@ def programs_of(observer: WindowObserver, log: Log, schedule: list[Any]) -> Prog
     memory, before = window.memory, (0, 0)
     for i in range(len(log)):
         u = log.u[i - 1] if i else np.zeros(log.u.shape[1])
-        window._enter(observer._sample(u, log.u[i], log.y[i], schedule[i]), None)
+        window._enter(observer._sampler.sample(u, log.u[i], log.y[i], schedule[i], i), None)
         begun = process_time_ns()
         verdict, _ = memory.solve(kernel.ARRIVAL, 0, kernel.ALL, kernel.UNLIMITED)
         solved = process_time_ns()

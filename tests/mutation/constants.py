@@ -167,7 +167,7 @@ CONSTANTS = (
     Constant("svo.analysis.input_design", "_DECREASE", "heuristic"),
     Constant("svo.analysis.sparse_program", "FEASIBILITY", "heuristic"),
     Constant("svo.analysis.model_pair", "_DELTA_TOLERANCE", "heuristic"),
-    Constant("svo.observers.window.observer", "_BLURRED", "heuristic"),
+    Constant("svo.observers.window.restarting", "_BLURRED", "heuristic"),
     Constant("svo.observers.window.prover", "_EPS", "heuristic"),
     Constant("svo.observers.window.chain_starts", "_ROUNDED_UP", "heuristic"),
     Constant("svo.observers.window.sign_split", "_INEXACT", "heuristic"),
