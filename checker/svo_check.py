@@ -3,9 +3,8 @@
 
     python svo_check.py proof.jsonl.gz --model plant.json --log log.csv
 
-Numbers are dyadic, integers times a power of two, so that nothing is rounded; only what the factors of a channel leave
-out of its matrix is bounded in floats, rounded outward. It solves nothing: the proof has the multipliers, and the first
-step that does not follow ends the check. Exit code 0: every chain is proven.
+Numbers are integers times a power of two, so that nothing is rounded but, outward, what the factors of a channel leave
+out. Nothing is solved: the proof has the multipliers. Exit code 0: every chain is proven; 1: a step does not follow.
 """
 
 import argparse
@@ -18,6 +17,7 @@ import math
 import re
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 FLOAT = re.compile(r"(?:-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf)")
@@ -69,18 +69,8 @@ class Vec:  # integers times 2^e; a number is a vector of one, and multiplies ve
     def __lt__(self, other):
         return (self - other).m[0] < 0
 
-    def __bool__(self):
-        return any(self.m)
-
     def __getitem__(self, part):
         return Vec(self.m[part], self.e)
-
-    def dot(self, other):
-        return Vec([sum(x * y for x, y in zip(self.m, other.m, strict=True) if x)], self.e + other.e)
-
-    def then(self, other):
-        e = min(self.e, other.e)
-        return Vec([x << (self.e - e) for x in self.m] + [x << (other.e - e) for x in other.m], e)
 
 
 def num(value):
@@ -88,7 +78,6 @@ def num(value):
 
 
 def up(value):
-    expect(not math.isnan(value), "a bound is not a number")
     return math.nextafter(value, math.inf)
 
 
@@ -110,8 +99,7 @@ def array(record, *shape):  # a nested list of floats; a None in the shape is an
     return values
 
 
-def stated(step, where, name, width):
-    """Places with their row of an array; none where the step has none."""
+def stated(step, where, name, width):  # places with their row of an array; none where the step has none
     places = step.get(where, [])
     return zip(places, array(step[name], len(places), width) if places else [], strict=True)
 
@@ -130,12 +118,11 @@ def lines_of(path):  # of a file, packed or not, those that are not blank
     return (line for line in io.BytesIO(content) if line.strip())
 
 
-def once(pairs):
-    expect(len(dict(pairs)) == len(pairs), "an entry stands twice in an object")
-    return dict(pairs)
-
-
 def parsed(text):  # JSON that no two programs read differently
+    def once(pairs):
+        expect(len(dict(pairs)) == len(pairs), "an entry stands twice in an object")
+        return dict(pairs)
+
     return json.loads(text.decode("ascii"), object_pairs_hook=once, parse_constant=real)
 
 
@@ -149,7 +136,7 @@ class Log:
     def __init__(self, path, columns):
         text = Path(path).read_text(encoding="utf-8-sig")
         whole = io.StringIO(text[: text.rfind("\n") + 1], newline="")  # a line without its end is no sample
-        header, *rows = [row for row in csv.reader(whole, strict=True, skipinitialspace=True) if row]
+        header, *rows = [row for row in csv.reader(whole, strict=True, skipinitialspace=True) if row] or [[]]
         groups = [[columns["time"]], columns["inputs"], columns["outputs"]]
         expect(all(header.count(name) == 1 for g in groups for name in g), f"expected one column each of {groups}")
         expect({*map(len, rows)} <= {len(header)}, "a row of the log has other cells than its header")
@@ -160,7 +147,7 @@ class Log:
         for k in range(last):
             dt, wanted = self.time[k + 1] - self.time[k], intervals[k] if intervals else Ts
             near = dt == wanted if intervals else abs(dt - Ts) <= TOLERANCE * Ts
-            expect(near, f"samples {k} and {k + 1} are {dt:g} s apart, not {wanted:g}")
+            expect(near and dt > 0.0, f"samples {k} and {k + 1} are {dt:g} s apart, not {wanted:g}")
 
 
 class Set:  # {x : box[0] <= x <= box[1], ends[0] <= rows x <= ends[1]}
@@ -168,14 +155,35 @@ class Set:  # {x : box[0] <= x <= box[1], ends[0] <= rows x <= ends[1]}
         self.box, self.rows, self.ends = box, rows, ends
 
     @classmethod
-    def read(cls, record, n):
+    def read(cls, record, n, box=None):
         rows = array(record["rows"], None, n)
         ends = [array(record[end], len(rows)) for end in ("lower", "upper")]
-        return cls([array(record[end], n) for end in ("box_lower", "box_upper")], rows, ends)
+        return cls(box or [array(record[end], n) for end in ("box_lower", "box_upper")], rows, ends)
 
     def within(self, other):
-        pairs = [list(zip(*both, strict=True)) for both in zip(self.box, other.box, strict=True)]
-        return Set([[max(pair) for pair in pairs[0]], [min(pair) for pair in pairs[1]]], self.rows, self.ends)
+        (low, high), (least, most) = self.box, other.box
+        return Set([[*map(max, low, least)], [*map(min, high, most)]], self.rows, self.ends)
+
+    def least(self, g, multipliers=()):  # of g x, less the multiplied rows
+        total = num(0.0)
+        for m, row, *ends in zip(multipliers, self.rows, *self.ends, strict=True):
+            if m:
+                total -= num(m) * num(ends[m > 0])
+                g += num(m) * Vec.of(row)
+        for i, (x, *ends) in enumerate(zip(g.m, *self.box, strict=True)):
+            if x:
+                total += g[i : i + 1] * num(ends[x < 0])  # an end that is not there is no finite number
+        return total
+
+    def expect_point(self, what):  # each row looked at alone; of what is empty a proof says nothing
+        pairs = [pair for both in (self.box, self.ends) for pair in zip(*both, strict=True)]
+        holds = all(low <= high and low < math.inf and high > -math.inf for low, high in pairs)
+        for row, *ends in zip(self.rows, *self.ends, strict=True):
+            for side, end in zip((-1.0, 1.0), ends, strict=True):
+                at = [self.box[side * v < 0][j] for j, v in enumerate(row) if v]
+                if holds and all(map(math.isfinite, (end, *at))):
+                    holds = not num(side * end) < Set(self.box).least(Vec.of([side * v for v in row]))
+        expect(holds, f"nothing is within {what}; expected lower bounds up to upper ones, and rows that meet these")
 
 
 class Model:  # an observer's: the numbers of plant.json alone, never those of a proof
@@ -187,26 +195,40 @@ class Model:  # an observer's: the numbers of plant.json alone, never those of a
         given = record["matrices"]
         self._points, self._schedule = (array(given[p], None) if p in given else None for p in ("points", "schedule"))
         self._stacks = array(given["stacks"], None, 1 + len(self.delta), self.rows, self.columns)
+        points = self._points or range(len(self._stacks))
+        expect(len(points) == len(self._stacks) and all(a < b for a, b in pairwise(points)), "points are out of order")
         self._bounds = [array(record[b], None, size) for b, size in (("noise", ny), ("w_lower", nw), ("w_upper", nw))]
         sums = record.get("sums", [])
         self._remainder = array(record["remainder"], None, ny) if "remainder" in record else [[0.0] * ny]
         self.sums = [(count(s["column"], 0, ny + nw), count(s["samples"], 1), *array(s["ends"], 2)) for s in sums]
-        self.w_rows = array(record["w_rows"]["rows"], None, nw)
-        self.w_ends = [array(record["w_rows"][end], len(self.w_rows)) for end in ("lower", "upper")]
+        self.w_set = Set.read(record["w_rows"], nw, [[-math.inf] * nw, [math.inf] * nw])
         self.first = Set.read(record["first"], n)
         ranges = (record["physical"], record["largest"])
         self.physical, self.largest = (None if r is None else Set([array(end, n) for end in r]) for r in ranges)
         self.always = self.physical or Set([[-math.inf] * n, [math.inf] * n])
+        self._expect_points()
         self.is_scheduled = self._points is not None or len(self._stacks) > 1
         self.premises = ["the state never leaves the physical range of the model"] * (self.physical is not None)
         self.premises += ["the model file has the right matrices of each sample: an AXIOM"] * self.is_scheduled
         self._known = {}
 
+    def _expect_points(self):
+        for k in range(max(map(len, (*self._bounds, self._remainder)))):
+            noise, low, high, remainder = Model.bounds(self, k)
+            Set([[0.0] * 2 * self.ny, noise + remainder]).expect_point("the noise")
+            Set([low, high], self.w_set.rows, self.w_set.ends).expect_point("the bounds of w")
+        noise, low, high = (list(map(f, *b, b[0])) for f, b in zip((max, min, max), self._bounds, strict=True))
+        for j, length, *ends in self.sums:
+            reach = [[each[j]] for each in ([-v for v in noise] + low, noise + high)]
+            Set(reach, [[float(length)]], [[end] for end in ends]).expect_point("the ends of a sum")
+        Set([*zip(*self.delta, strict=True)] or ((), ())).expect_point("the bounds of Delta")
+        for of in (self.always, self.first, self.largest or self.always):
+            of.within(self.always).expect_point("a set of the state")
+
     def bounds(self, k):  # noise, lower and upper w, and remainder of the output of a sample
         return [each[0 if len(each) == 1 else k] for each in (*self._bounds, self._remainder)]
 
-    def stack(self, k):
-        """Matrices of a sample: items of rows of floats; the first one exactly, integers times a power of two."""
+    def stack(self, k):  # of a sample: items of rows of floats; the first one as integers times a power of two
         k = k if self.is_scheduled else 0
         if k not in self._known:
             floats = self._stacks[0 if len(self._stacks) == 1 else k] if self._points is None else self._at(k)
@@ -229,7 +251,8 @@ class Model:  # an observer's: the numbers of plant.json alone, never those of a
 class Chain:  # what follows, step by step, about one observer's model
     def __init__(self, model, log, claimed):
         self.model, self.log, self.claimed, self.start, self.directions, self.checked = model, log, claimed, None, [], 0
-        self.bounds, self.s, self.channels, self.premises = {}, {}, {}, []
+        self.bounds, self.channels, self.premises = {}, {}, []
+        self._sample = lambda value: count(value, 0, claimed + 1)  # nothing after it is used
 
     def take(self, step):
         kind = step["step"]
@@ -239,19 +262,16 @@ class Chain:  # what follows, step by step, about one observer's model
             k, side, value = self._sample(step["sample"]), SIDES[step["side"]], real(step["value"])
             which = count(step["channel" if kind == "s" else "row"])
             self._bounded(step, value, k, (self.channels[k][2] if kind == "s" else self.directions)[which], side)
-            (self.s if kind == "s" else self.bounds)[k, which, side] = value
+            (self.channels[k][4] if kind == "s" else self.bounds)[k, which, side] = value
         else:
             expect(kind == "alarm", "no step of a known kind")
             expect(self._total(step).m[0] > 0, "the multipliers do not prove that the window is empty")
         self.checked += 1
 
-    def _sample(self, value):  # nothing after the sample of the claim is used
-        return count(value, 0, self.claimed + 1)
-
     def _start(self, step):  # everything before is forgotten
         k, kind, model = self._sample(step["sample"]), step["from"], self.model
         expect(kind in STARTS and (k == 0 or kind != "first"), "no known start, or a first set after sample 0")
-        self.bounds, self.s, self.channels = {}, {}, {}
+        self.bounds, self.channels = {}, {}
         axes = [[float(i == j) for j in range(model.n)] for i in range(model.n)]
         self.directions = axes + array(step["template"], None, model.n)
         if kind in ("readings", "assumed"):
@@ -260,6 +280,8 @@ class Chain:  # what follows, step by step, about one observer's model
             found = getattr(model, kind)
         expect(found is not None, f"the model has no {kind} set")
         self.start = k, found.within(model.always)
+        if kind == "assumed":
+            self.start[1].expect_point("the set that is assumed")
         box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
         rows = zip(found.rows, *found.ends, strict=True)
         box += "".join(f"; {row} x: {low:.6g} to {high:.6g}" for row, low, high in rows)
@@ -284,18 +306,15 @@ class Chain:  # what follows, step by step, about one observer's model
         ends = [[self.bounds.get((k, row, side), side * math.inf) for row in rows] for side in (-1, 1)]
         return Set([e[:n] for e in ends], self.directions[n:], [e[n:] for e in ends]).within(self.model.always)
 
-    def _channels(self, step):
-        """Factors of the uncertainties at a sample; bounds of the s of other factors are none of these."""
+    def _channels(self, step):  # factors at a sample; bounds of the s of other factors are none of these
         model, k = self.model, self._sample(step["sample"])
         owner = [count(i, 1, 1 + len(model.delta)) for i in step["owner"]]
         gain = array(step["gain"], len(owner), model.rows)
         functional = array(step["functional"], len(owner), model.columns)
-        for q in range(len(self._factors(k)[0])):
-            self.s.pop((k, q, 1), None), self.s.pop((k, q, -1), None)
         self._choose(k, owner, gain, functional)
 
     def _choose(self, k, owner=(), gain=(), functional=()):
-        """Factors, and max |Delta| |stack - sum gain functional'|, entry by entry, rounded up, where it is not zero."""
+        """Factors, if any, and max |Delta| |stack - sum gain functional'|, by entries, rounded up, where not zero."""
         found = {}
         for item, ends in enumerate(self.model.delta, start=1):
             for i, row in enumerate(self.model.stack(k)[0][item]):
@@ -305,27 +324,22 @@ class Chain:  # what follows, step by step, about one observer's model
                 for j in (j for j, m in enumerate(rest.m) if m):
                     size = up(abs(rest.m[j] << max(rest.e, 0)) / (1 << max(-rest.e, 0)))
                     found[i, j] = up(found.get((i, j), 0.0) + up(size * max(map(abs, ends))))
-        self.channels[k] = owner, gain, functional, found
+        self.channels[k] = owner, gain, functional, found, {}  # and bounds of s
         return self.channels[k]
 
-    def _factors(self, k):
-        return self.channels.get(k) or self._choose(k)  # without any, all of the uncertainties is left out
-
-    def _bounded(self, step, value, k, direction, side, on_output=None):
-        """Whether direction'(x, u, 1, w) at a sample is at most, or at least, a value."""
+    def _bounded(self, step, value, k, direction, side, on_output=None):  # direction'(x, u, 1, w) at a sample, by value
         whole = direction + [0.0] * (self.model.columns - len(direction))
         total = self._total(step, k, Vec.of([side * v for v in whole]), on_output)
         expect((total + num(side * value)).m[0] >= 0, f"a bound of sample {k} is not proven")
 
-    def _total(self, step, at=None, objective=None, on_output=None):
-        """Least value of the multiplied rows less their bounds, and less the objective at a sample."""
-        model = self.model
-        n, nu = model.n, model.nu
+    def _total(self, step, at=None, objective=None, on_output=None):  # least of rows less bounds, and less objective
+        model, n, nu = self.model, self.model.n, self.model.nu
         first, last = self._sample(step["first"]), self._sample(step["last"])
         length = last - first + 1
         expect(length > 0 and (at is None or first <= at <= last), "a window's samples are out of order")
         on_output, lines = on_output or array(step["on_output"], length, model.ny), self._lines(step, length)
-        on_w = array(step["on_w"], length, len(model.w_rows)) if "on_w" in step else [[]] * length
+        on_w = [[0.0] * (nh := len(model.w_set.rows))] * length
+        on_w = array(step["on_w"], length, nh) if "on_w" in step else on_w
         known, reach = self._set(first), None
         costate = Vec([0] * n)
         total, summed = self._sums(step, first, last)
@@ -337,18 +351,18 @@ class Chain:  # what follows, step by step, about one observer's model
             for m, y, *widths in zip(on_output[i], self.log.y[k], noise, remainder, strict=True):
                 if m:  # of a reading that is missing, which is no number
                     total -= num(m) * num(y) + num(abs(m)) * (num(widths[0]) + num(widths[1]))
-            more = summed.get(k, Vec([0] * (model.ny + model.columns)))
-            weight = costate.then(Vec.of(on_output[i]) + more[: model.ny])
+            more = summed.get(k, Vec([0] * (model.rows + model.columns)))
+            weight = Vec(costate.m + [0] * model.ny, costate.e) + Vec.of([0.0] * n + on_output[i]) + more[: model.rows]
             sums = [0] * model.columns
             for w, row in zip(weight.m, rows, strict=True):
                 if w:
                     sums = [s + w * r for s, r in zip(sums, row, strict=True)]
-            g = Vec(sums, weight.e + e) + more[model.ny :]
+            g = Vec(sums, weight.e + e) + more[model.rows :]
             if at == k:
                 g -= objective
-            owner, gain, functional, rest = self._factors(k)
+            owner, gain, functional, rest, _ = self.channels.get(k) or self._choose(k)
             for q in range(len(owner)):
-                on_p = weight.dot(Vec.of(gain[q]))
+                on_p = Set([gain[q]] * 2).least(weight)
                 for side, m, slope, intercept in lines.pop((i, q), ()):
                     # max Delta s is convex in s, and min Delta s concave: a line bounds them if it does at both ends
                     delta, ends = self._ends(k, q)
@@ -357,28 +371,17 @@ class Chain:  # what follows, step by step, about one observer's model
                     on_p += num(side * m)
                     g -= num(side * m) * num(slope) * Vec.of(functional[q])
                     total -= num(side * m) * num(intercept)
-                if on_p:
+                if on_p.m[0]:
                     products = [num(d) * num(s) for d in self._ends(k, q)[0] for s in self._ends(k, q)[1]]
                     total += on_p * (min(products) if on_p.m[0] > 0 else max(products))
             for row, column in (entry for entry in rest if weight.m[entry[0]]):
                 reach = reach or self._reach(known, first, last)
                 total -= Vec([abs(weight.m[row])], weight.e) * num(up(rest[row, column] * reach[i][column]))
-            if g[n : n + nu]:
-                total += g[n : n + nu].dot(Vec.of(self.log.u[k]))
-            total += g[n + nu : n + nu + 1]
-            g_w = g[n + nu + 1 :]
-            for h, m in enumerate(on_w[i]):
-                if m:
-                    total -= num(m) * num(model.w_ends[m > 0][h])
-                    g_w += num(m) * Vec.of(model.w_rows[h])
-            total += over_box(g_w, low, high)
+            total += Set([self.log.u[k]] * 2).least(g[n : n + nu]) + g[n + nu : n + nu + 1]
+            total += model.w_set.within(Set([low, high])).least(g[n + nu + 1 :], on_w[i])
             costate = g[:n]
         expect(not lines, "a line is of a channel that there is not")
-        for m, row, *ends in zip(array(step["on_start"], len(known.rows)), known.rows, *known.ends, strict=True):
-            if m:
-                total -= num(m) * num(ends[m > 0])
-                costate += num(m) * Vec.of(row)
-        return total + over_box(costate, *known.box)
+        return total + known.least(costate, array(step["on_start"], len(known.rows)))
 
     def _sums(self, step, first, last):
         """Rows that are sums: what their bounds come to, and by sample their multipliers of outputs, then of z."""
@@ -394,8 +397,8 @@ class Chain:  # what follows, step by step, about one observer's model
                     continue
                 if column < model.ny:
                     total -= num(m) * num(self.log.y[k][column]) + num(abs(m)) * num(remainder[column])
-                at = column if column < model.ny else model.n + model.nu + 1 + column  # z = (x, u, 1, w) is after ny
-                one = num(m) * Vec([int(j == at) for j in range(model.ny + model.columns)])
+                at = model.n + column + (column >= model.ny) * (model.n + model.nu + 1)  # of rows and z = (x, u, 1, w)
+                one = num(m) * Vec([int(j == at) for j in range(model.rows + model.columns)])
                 found[k] = found[k] + one if k in found else one
         return total, found
 
@@ -407,7 +410,7 @@ class Chain:  # what follows, step by step, about one observer's model
         return found
 
     def _ends(self, k, q):  # of Delta, and of s
-        s = [self.s.get((k, q, side)) for side in (-1, 1)]
+        s = [self.channels[k][4].get((k, q, side)) for side in (-1, 1)]
         expect(None not in s, f"s of a channel of sample {k} has no proven bounds")
         return self.model.delta[self.channels[k][0][q] - 1], s
 
@@ -428,14 +431,6 @@ def largest(low, high):
     return [max(abs(a), abs(b)) for a, b in zip(low, high, strict=True)]
 
 
-def over_box(g, low, high):  # least of g'x
-    total = num(0.0)
-    for i, (x, a, b) in enumerate(zip(g.m, low, high, strict=True)):
-        if x:
-            total += g[i : i + 1] * num(a if x > 0 else b)  # an end that is not there is no finite number
-    return total
-
-
 def linearised(*of):  # by the file beside this one
     sys.modules.setdefault("svo_check", sys.modules[__name__])
     sys.path.append(str(Path(__file__).parent))
@@ -452,9 +447,12 @@ def check(proof, plant, log):  # observer, sample and chain of every alarm of a 
             expect(chain is None, "a chain ends without its alarm")
             observer, sample = step["observer"], count(step["sample"], 0, len(log.time))
             expect(log.time[sample] == real(step["time"]), "a chain's time is not its sample's")
-            record = plant["observers"][observer]
-            is_linear = "equations" not in record
-            chain = Chain(Model(record), log, sample) if is_linear else linearised(record, plant, log, sample)
+            try:
+                record = plant["observers"][observer]
+                is_linear = "equations" not in record
+                chain = Chain(Model(record), log, sample) if is_linear else linearised(record, plant, log, sample)
+            except REFUSALS as error:
+                raise Wrong(f"the model {observer!r:.60} of the model file: {said(error)}") from error
             continue
         expect(chain is not None, "a step stands in no chain")
         chain.take(step)
@@ -465,10 +463,14 @@ def check(proof, plant, log):  # observer, sample and chain of every alarm of a 
     return done
 
 
+def said(error):
+    return str(error) if isinstance(error, Wrong | OSError) else f"not of the format ({type(error).__name__}: {error})"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, needed in (("proof", {}), ("--model", {"required": True}), ("--log", {"required": True})):
-        parser.add_argument(name, **needed)
+    for name in ("proof", "--model", "--log"):
+        parser.add_argument(name, **{"required": True} if name[0] == "-" else {})
     given, begun = parser.parse_args(), time.process_time()
     try:
         plant = parsed(Path(at := given.model).read_bytes())
@@ -479,9 +481,7 @@ def main():
         intervals = array(plant["intervals"], len(log.time) - 1) if "intervals" in plant else None
         log.check_times(max(sample for _, sample, _ in found), real(plant["Ts"]), intervals)
     except REFUSALS as error:
-        is_said = isinstance(error, Wrong | OSError)
-        why = str(error) if is_said else f"not of the format ({type(error).__name__}: {error})"
-        print(f"NOT PROVEN: {at}: {why:.250}")
+        print(f"NOT PROVEN: {at}: {said(error):.250}")
         return 1
     for observer, sample, chain in found:
         print(f"PROVEN: {observer!r} is falsified at sample {sample} ({log.time[sample]:g} s); {chain.checked} steps")

@@ -365,7 +365,7 @@ def lines_of(forms, box):  # rows as slopes and a constant, all intervals
 
 
 def range_of(given, n, outward):  # as integers; what is infinite stays so
-    low, high = given or ([-math.inf] * n, [math.inf] * n)
+    low, high = [[-math.inf] * n, [math.inf] * n] if given is None else (array(end, n) for end in given)
     whole = lambda v, end: v if math.isinf(v) else ends(v)[end]  # noqa: E731
     return [(whole(a, not outward), whole(b, outward)) for a, b in pairs(low, high)]
 
@@ -373,20 +373,20 @@ def range_of(given, n, outward):  # as integers; what is infinite stays so
 class Equations(Model):  # a nonlinear model: what has been linearised of it stands in the place of its matrices.
     def __init__(self, record, plant):
         n, nu, ny, nw = (count(record[key]) for key in ("n", "inputs", "outputs", "disturbances"))
-        shape, told = [1, 1, n + ny, n + nu + 1 + nw], record["equations"]
-        super().__init__(record | {"matrices": {"stacks": {"shape": shape, "hex": " ".join(["0"] * math.prod(shape))}}})
-        self.nw, self.is_map, self.varies = count(nw - n), not told["continuous"], {*map(count, told["varying"])}
+        shape, told = [0, 1, n + ny, n + nu + 1 + nw], record["equations"]
+        super().__init__(record | {"matrices": {"stacks": {"shape": shape, "hex": ""}}})
+        self.nw, self.is_map = count(nw - n), [True, False].index(told["continuous"])  # nothing else
+        self.varies, parts = {*map(count, told["varying"])}, (slice(self.nw), slice(self.nw, nw))
         self.times = array(plant["intervals"], None) if "intervals" in plant else [real(plant["Ts"])]
-        parts = slice(self.nw), slice(self.nw, nw)  # one row for all samples
-        self.w, left_out = (box_of(*(row[part] for (row,) in self._bounds[1:])) for part in parts)
-        others = *self._remainder, *(row[self.nw :] for row in self.w_rows), self.delta, self.sums
+        self.w, left_out = (box_of(*(row[part] for (row,) in self._bounds[1:])) for part in parts)  # all samples'
+        others = *self._remainder, *(row[self.nw :] for row in self.w_set.rows), self.delta, self.sums
         is_one = max(self.varies, default=-1) < self.nw and left_out == [(-ONE, ONE)] * n
         expect(is_one and not any(map(any, others)), "the model has an entry that is none of a nonlinear one")
         self.f, self.h = (Tape(told[name], n + self.nw + nu, rows) for name, rows in (("f", n), ("h", ny)))
-        self.valid = range_of(told["valid"] and [array(end, n) for end in told["valid"]], n, False)
-        self.held = range_of(self.physical and self.physical.box, n, True)
+        self.valid, self.held = range_of(told["valid"], n, False), range_of(record["physical"], n, True)
+        Set([*pairs(*self.valid)]).within(Set([*pairs(*self.held)])).expect_point("the range of the equations")
         self.premises += ["the equations hold where the state is in their range"] * (told["valid"] is not None)
-        self.transitions, self.readings, self.nothing = {}, {}, self._stacks[0][0]
+        self.transitions, self.readings, self.nothing = {}, {}, [[0.0] * self.columns] * self.rows
 
     def stack(self, k):
         rows = self.transitions.get(k, self.nothing[: self.n]) + self.readings.get(k, (self.nothing[self.n :],))[0]
