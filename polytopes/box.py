@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polytopes.checks import Floats
-from polytopes.native import Address, Entries, Integer, function
+from polytopes.native import Address, Entries, InCore, Integer, function
 from polytopes.rounding import check_rounding
 
 _COORDINATES = 16  # with more, vertices are too many
@@ -36,14 +36,11 @@ class Box(NamedTuple):
         return self.found[2]
 
     @classmethod
-    def of(cls, A: Floats, b: Floats, C: Floats) -> Self | None:
-        """The box of rows ``A x <= b``, ``C x = d``; None if they are none, or empty, or far from the origin."""
+    def of(cls, rows: InCore) -> Self | None:
+        """The box of rows ``A x <= b``; None if they are none, or empty, or far from the origin."""
         check_rounding()
-        m, n = A.shape
-        if len(C) or np.count_nonzero(A) > m:
-            return None
-        found = np.empty((5, n))
-        return cls(found) if _box(m, n, A.tobytes(), b.tobytes(), found) else None
+        found = np.empty((5, rows[0]))
+        return cls(found) if _box(*rows, found) else None
 
     @property
     def rounded(self) -> NDArray[np.bool_]:

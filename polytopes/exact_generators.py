@@ -8,7 +8,7 @@ import numpy as np
 
 from polytopes.errors import UndecidedError
 from polytopes.general_position import WIDE
-from polytopes.integers import Floats, integer_rows, maybe_short, short
+from polytopes.integers import Floats, integer_rows
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators, ExactRows, generators_of
 from polytopes.short_sets import SHORT_RAYS
@@ -21,35 +21,29 @@ _COORDINATES = 16
 
 
 def exact_generators(
-    A: Floats, b: Floats, C: Floats, d: Floats, program: Program, known: ExactGenerators | None = None
+    A: Floats, b: Floats, C: Floats, d: Floats, short: bool, program: Program, known: ExactGenerators | None = None
 ) -> ExactGenerators | None:
     """Generators of a set ``{x : A x <= b, C x = d}`` in integers, `known` or not; None where it is left to floats."""
     if A.shape[1] > _COORDINATES:
         return None
-    rows = integer_form(A, b, C, d)
-    plain = short(rows.inequalities) and short(rows.equalities)
-    if not plain and (b.size + d.size > _LONG_ROWS or wide(program)):
+    if not short and (b.size + d.size > _LONG_ROWS or wide(program)):
         return None
     if known is not None:
         return known
     try:
-        return generators_of(rows, SHORT_RAYS if plain else LONG_RAYS)
+        return generators_of(integer_form(A, b, C, d), SHORT_RAYS if short else LONG_RAYS)
     except UndecidedError:
         return None
 
 
-def few_generators(A: Floats, b: Floats, C: Floats, d: Floats, program: Program) -> ExactGenerators | None:
+def few_generators(A: Floats, b: Floats, C: Floats, d: Floats, short: bool, program: Program) -> ExactGenerators | None:
     """The same, if there are at most 200; without a program for a set that is not flat or thin."""
     if A.shape[1] > _COORDINATES or b.size + d.size > _LONG_ROWS:
         return None
-    plain = maybe_short(A, b)
-    if not plain and program.fat and not program.flat.pivots:
-        return None
-    rows = integer_form(A, b, C, d)
-    if plain and not (short(rows.inequalities) and short(rows.equalities)):
+    if not short and program.fat and not program.flat.pivots:
         return None
     try:
-        return generators_of(rows, _FEW_RAYS)
+        return generators_of(integer_form(A, b, C, d), _FEW_RAYS)
     except UndecidedError:
         return None
 

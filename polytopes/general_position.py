@@ -26,7 +26,7 @@ _ROOM = 120  # vertices or facets for which there is room from the start
 _NO_ROOM = -3  # why there is no answer yet
 
 _vertices = function(
-    "fdi_prepared_vertices", *[Integer] * 2, Entries, *[Real] * 2, Integer, Entries, *[Address] * 2, returns=Integer
+    "fdi_prepared_vertices", *[Integer] * 2, Address, *[Real] * 2, Integer, Entries, *[Address] * 2, returns=Integer
 )
 _hull = function("fdi_point_hull", *[Integer] * 2, Given, Real, Integer, Entries, Address, returns=Integer)
 _vertices_room, _hull_room = (
@@ -37,8 +37,7 @@ _vertices_room, _hull_room = (
 
 def listed_vertices(rows: PreparedRows) -> Floats | None:
     """Vertices (k, n) of a set, in lexicographic order; None where it is not certain that it is bounded by them."""
-    points = _listed(rows, None)
-    return None if points is None else points[np.lexsort(points.T[::-1])]
+    return _listed(rows, None)
 
 
 def summed_volume(rows: PreparedRows) -> float | None:
@@ -48,11 +47,11 @@ def summed_volume(rows: PreparedRows) -> float | None:
 
 
 def _listed(rows: PreparedRows, volume: int | None) -> Floats | None:
-    m, n = rows.A.shape
+    n, m = rows.rows[:2]
 
     def call(room: int, points: Floats) -> int:
         block = scratch(_vertices_room(n, m, room))
-        count: int = _vertices(n, m, rows.block, WIDE, _APART, room, points, volume, block)
+        count: int = _vertices(n, m, rows.at, WIDE, _APART, room, points, volume, block)
         return count
 
     return _with_room(call, n)

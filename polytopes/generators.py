@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 
 from polytopes.checks import Floats
+from polytopes.double_description import Integers
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.exact_generators import integer_form
 from polytopes.fractions_given import exact_table, integers_of, primitive_row
 from polytopes.general_position import rows_around
 from polytopes.hull import Spread, outer_rows, point_offsets
-from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, lowest_bit, short, short_vector
+from polytopes.integers import floats_of_directions, floats_of_points, integer_rows, short
 from polytopes.kept_vertices import among
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of, rows_of
 from polytopes.outward import are_exact, float_rows
 from polytopes.rows import Rows, Table, no_equalities
-from polytopes.short_sets import short_hull
+from polytopes.short_sets import are_short, short_hull, short_unit
 from polytopes.shown import Shown
 from polytopes.support import is_bounded, known_nonempty
 from polytopes.vertices import vertices
 
-_SHORT_BITS = 32
 _FEW = 200  # long points up to which a flat hull is found in integers
 
 
@@ -131,21 +131,18 @@ def hull_and_vertices(V: Floats, rays: Floats) -> tuple[Table, Callable[[], Exac
     In integers where the numbers are short, where there are rays, and where the points are flat; the rows are exact if
     they are floats, and outward else.
     """
-    few_bits = short_vector([*V[0].tolist(), 1.0])
+    few_bits = are_short(V)
     known = exact_hull(V) if few_bits and not len(rays) else None
     if known is not None:
-        return known, lambda: among(distinct(integer_rows(np.hstack([V, np.ones((len(V), 1))]))), integer_form(*known))
-    unit = _unit(V)
+        return known, lambda: among(distinct(_homogeneous(V)), integer_form(*known))
+    unit = 0 if few_bits else short_unit(V)
     if unit:
         A, b, C, d = rows_of_generators(np.ldexp(V, -unit), rays)
         return (A, np.ldexp(b, unit), C, np.ldexp(d, unit)), None
     around = None if few_bits or len(rays) else _table(rows_around(V))
     if around is not None:
         return around, None
-    points = integer_rows(np.hstack([V, np.ones((len(V), 1))]))
-    around = None if len(rays) or short(points) else _table(rows_around(V))
-    if around is not None:
-        return around, None
+    points = _homogeneous(V)
     directions = integer_rows(rays[rays.any(axis=1)])
     exact = short(points) or len(directions) > 0
     spread = None if exact else Spread.of(V)
@@ -162,11 +159,6 @@ def hull_and_vertices(V: Floats, rays: Floats) -> tuple[Table, Callable[[], Exac
     return (A, b, np.empty((0, V.shape[1])), np.empty(0)), None
 
 
-def _unit(V: Floats) -> int:
-    """The exponent of a power of two of which points V are short multiples; 0 where they are short as they are."""
-    some = V[V != 0.0]
-    if not some.size or not short_vector([some.item(0)]):
-        return 0
-    lowest, highest = int(lowest_bit(some).min()), int(np.frexp(some)[1].max())
-    near = lowest >= -_SHORT_BITS and highest <= _SHORT_BITS
-    return 0 if near or highest - lowest > _SHORT_BITS else lowest
+def _homogeneous(V: Floats) -> Integers:
+    """Points (k, n) as rows ``[x, t]`` of integers."""
+    return integer_rows(np.hstack([V, np.ones((len(V), 1))]))

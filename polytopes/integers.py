@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from math import gcd
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,19 +53,6 @@ def lowest_bit(table: Floats) -> NDArray[np.int64]:
 def short(rows: Integers) -> bool:
     """Whether rows are so short that results in their integers are, as a rule, floats again."""
     return rows.dtype != object and int(np.abs(rows).max(initial=0)) < SHORT
-
-
-def short_vector(values: list[float]) -> bool:
-    """The same for one row of floats, in some microseconds."""
-    ratios = [v.as_integer_ratio() for v in values]
-    common = max(q for _, q in ratios)
-    whole = [abs(p) * (common // q) for p, q in ratios]
-    return max(whole) < SHORT * max(gcd(*whole), 1)
-
-
-def maybe_short(rows: Floats, rhs: Floats) -> bool:
-    """Whether the first row is short: as a rule, all are then."""
-    return len(rows) > 0 and short_vector([*rows[0].tolist(), float(rhs[0])])
 
 
 def is_short(*tables: Floats) -> bool:

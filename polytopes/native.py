@@ -24,6 +24,8 @@ Integer = ctypes.c_int64
 Real = ctypes.c_double
 
 _bytes = (ctypes.c_char * 0).from_buffer  # a quarter of the time of the array's own interface
+InCore = tuple[int, int, bytes, bytes]
+"""Rows as functions of the core take them: coordinates n, how many m, and the numbers of A (m, n) and b (m,)."""
 _COPIED = 500  # entries of an array below which a copy takes less time than its address
 
 
@@ -67,6 +69,10 @@ def function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., A
 def address(array: NDArray) -> int:
     """Where the first entry of an array lies."""
     return int(array.__array_interface__["data"][0])
+
+
+handle: Callable[[NDArray], Any] = _bytes  # type: ignore[assignment]
+"""An array as an `Address` that keeps it alive: for one that goes to the core again and again."""
 
 
 class _Scratch(threading.local):

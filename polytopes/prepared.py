@@ -5,7 +5,7 @@ whose bound is not near the value that was found, go through `Program`.  See `co
 """
 
 from functools import lru_cache
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +25,15 @@ from polytopes.linear_program import (
     Program,
     small,
 )
-from polytopes.native import Address, Entries, Given, Integer, Real, address, function, scratch
+from polytopes.native import Address, Entries, Given, InCore, Integer, Real, address, function, handle, scratch
 from polytopes.rounding import check_rounding
 
-_prepare = function("fdi_prepared", *[Integer] * 2, *[Given] * 2, *[Real] * 2, Entries, Address, returns=Integer)
-_ball = function("fdi_prepared_ball", *[Integer] * 2, Given, Entries, *[Real] * 2, Entries, Address, returns=Integer)
+_prepare = function("fdi_prepared", *[Integer] * 2, *[Address] * 2, *[Real] * 2, *[Address] * 2, returns=Integer)
+_ball = function("fdi_prepared_ball", *[Integer] * 2, *[Address] * 2, *[Real] * 2, Entries, Address, returns=Integer)
 _supports = function(
-    "fdi_prepared_supports", *[Integer] * 3, Entries, Given, *[Real] * 2, Entries, *[Address] * 3, returns=Integer
+    "fdi_prepared_supports", *[Integer] * 3, Address, Given, *[Real] * 2, Entries, *[Address] * 3, returns=Integer
 )
-_facets = function("fdi_prepared_facets", *[Integer] * 2, *[Entries] * 3, Address, returns=Integer)
+_facets = function("fdi_prepared_facets", *[Integer] * 2, Address, *[Entries] * 2, Address, returns=Integer)
 _size, _room, _ball_room, _facets_room = (
     lru_cache(1024)(function(f"fdi_prepared{name}", *[Integer] * 2, returns=Integer))
     for name in ("_size", "_room", "_ball_room", "_facets_room")
@@ -46,23 +46,25 @@ class PreparedRows(NamedTuple):
 
     A: Floats
     b: Floats
+    rows: InCore
     block: Floats
+    at: Any
 
     @classmethod
-    def of(cls, A: Floats, b: Floats) -> Self | None:
+    def of(cls, A: Floats, b: Floats, rows: InCore) -> Self | None:
         """The rows A (m, n), b (m,) prepared; None where floats do not settle at once that a ball fits in."""
         check_rounding()
-        m, n = A.shape
+        n, m = rows[:2]
         if not m or not small(n, m):
             return None
         block = np.empty(_size(n, m))
-        return cls(A, b, block) if _prepare(n, m, A, b, WIDEST, SMALL_BALL, block, scratch(_room(n, m))) else None
+        at = handle(block)
+        return cls(A, b, rows, block, at) if _prepare(*rows, WIDEST, SMALL_BALL, at, scratch(_room(n, m))) else None
 
     @property
     def centre(self) -> Floats:
         """The centre (n,) of the largest ball in even units; it satisfies every row by more than is rounded."""
-        parts = self._parts()
-        return np.ldexp(parts[4][:-1], parts[7].view(np.int64))
+        return self.block[2 : 2 + self.rows[0]].copy()
 
     def supports(self, directions: Floats) -> Floats | None:
         """Upper bounds (k,) of the supports along directions (k, n), inf where unbounded; None if one is open."""
@@ -79,29 +81,29 @@ class PreparedRows(NamedTuple):
 
     def _settled(self, directions: Floats, values: Floats, points: int | None, weights: int | None) -> int:
         check_rounding()
-        (k, n), m = directions.shape, self.b.size
+        n, m, k = *self.rows[:2], len(directions)
         room = scratch(_supports_room(n, m, k))
-        settled: int = _supports(n, m, k, self.block, directions, CLEAN, SHARP, values, points, weights, room)
+        settled: int = _supports(n, m, k, self.at, directions, CLEAN, SHARP, values, points, weights, room)
         return settled
 
     def ball(self) -> tuple[Floats, float] | None:
         """Centre (n,) and radius of a largest ball; None if it is not settled."""
-        m, n = self.A.shape
+        n, m, A, _ = self.rows
         found = np.empty(n + 1)
-        settled = _ball(n, m, self.A, self.block, WIDEST, CLEAN, found, scratch(_ball_room(n, m)))
+        settled = _ball(n, m, A, self.at, WIDEST, CLEAN, found, scratch(_ball_room(n, m)))
         return (found[:n], found.item(n)) if settled else None
 
     def facets(self) -> NDArray[np.int64] | None:
         """Numbers of a minimal set of the rows; None if rounding leaves one open."""
-        m, n = self.A.shape
+        n, m = self.rows[:2]
         rows, doubtful = np.empty((2, m), np.int64)
-        count = _facets(n, m, self.block, rows, doubtful, scratch(_facets_room(n, m)))
+        count = _facets(n, m, self.at, rows, doubtful, scratch(_facets_room(n, m)))
         return None if np.count_nonzero(doubtful[:count]) else rows[:count]
 
     def program(self) -> Program:
         """The rows as a program, its largest ball known."""
         m, n = self.A.shape
-        _, AT, rhs, norms, centre, weights, _, columns, rows = self._parts()
+        _, _, AT, rhs, norms, centre, weights, _, columns, rows = self._parts()
         radius, powers, row_powers = self.block.item(0), columns.view(np.int64), rows.view(np.int64)
         flat, AT, every = _everywhere(n), AT.reshape(n, m), np.arange(m)
         exact = EvenRows(self.A, self.b, flat, row_powers, powers)
@@ -110,10 +112,10 @@ class PreparedRows(NamedTuple):
         return program
 
     def _parts(self) -> list[Floats]:
-        """Head, AT, rhs, norms, centre, multipliers, reach, exponents of columns and of rows, as the core has them."""
+        """Head, point, AT, rhs, norms, centre, multipliers, reach, exponents of columns and rows, as in the core."""
         m, n = self.A.shape
         parts, end = [], 0
-        for size in (2, n * m, m, m, n + 1, m, n, n, m):
+        for size in (2, n, n * m, m, m, n + 1, m, n, n, m):
             parts.append(self.block[end : end + size])
             end += size
         return parts

@@ -77,7 +77,7 @@ def project(
         return known
     if not known_nonempty(P):
         return np.zeros((1, k)), np.array([-1.0]), np.empty((0, k)), np.empty(0)
-    few = few_generators(P.A, P.b, P.C, P.d, P.program) if method == "auto" else None
+    few = few_generators(*P.table, P.short, P.program) if method == "auto" else None
     if few is not None:
         return float_rows(shadow(few, list(keep)))
     P = explicit(P)

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import isfinite
 from typing import Any, Self
 
 import numpy as np
@@ -15,16 +14,19 @@ from polytopes.emptiness import Emptiness, decide_emptiness
 from polytopes.exact_generators import exact_generators, wide
 from polytopes.fractions_given import hold_fractions, rows_of_floats
 from polytopes.general_position import listed_vertices
-from polytopes.integers import is_short, maybe_short
+from polytopes.integers import is_short
 from polytopes.lengths import evened, lengths
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
+from polytopes.native import Address, InCore, Integer, function
 from polytopes.preparation import prepare
 from polytopes.prepared import PreparedRows, both_ways
-from polytopes.short_sets import Corners, short_vertices
+from polytopes.short_sets import Corners, has_short_rows, short_vertices
 from polytopes.value import Value
 
 _FLOAT = np.dtype(np.float64)
+_NOT_FINITE, _, _ONE_ENTRY_A_ROW = range(3)  # what rows are at a look
+_look = function("fdi_look", *[Integer] * 2, *[Address] * 2, returns=Integer)
 Table = tuple[Floats, Floats, Floats, Floats]
 """Rows A, b, C, d: what the operations hand to the constructor of a set."""
 
@@ -52,30 +54,21 @@ class Rows(Value):
     d: Floats
 
     def __init__(self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None) -> None:
-        given = _as_they_are(A, b) if d is None or (type(d) is np.ndarray and d.shape == (0,)) else None
-        if given is not None and (C is None) == (d is None) and (C is None or np.shape(C) == given[2].shape):
-            self.__dict__.update(zip("AbCd", given, strict=True))
-            return
-        if hold_fractions(A, b):
-            A, b = rows_of_floats("Ab", dense(A), b)
-        if hold_fractions(C, d):
-            C, d = rows_of_floats("Cd", dense(C), d)
-        rows = real_array("A", dense(A), ("m", "n"))
-        m, n = rows.shape
-        if n == 0:
-            raise ValueError(f"A has shape {rows.shape}; expected at least one column. Use shape (0, n) for no rows.")
-        rhs = real_array("b", b, (m,), meaning="one entry per row of A", finite=False)
-        if np.count_nonzero(np.isfinite(rhs)) < m:
-            rows, rhs = _bounding(rows, rhs)
-        if (C is None) != (d is None):
-            raise ValueError("C and d must be given together: the equalities are C x = d.")
-        fixed = (
-            np.empty((0, n)) if C is None else real_array("C", dense(C), ("q", n), meaning="one column per column of A")
-        )
-        values = np.empty(0) if d is None else real_array("d", d, (len(fixed),), meaning="one entry per row of C")
-        for name, array in zip("AbCd", (rows, rhs, fixed, values), strict=True):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        plain = _are_arrays(A, b) and _hold_nothing(C, d, A.shape[1])  # type: ignore[union-attr]
+        if not (plain and self._hold(A, b, *no_equalities(A.shape[1]))):  # type: ignore[arg-type, union-attr]
+            self._hold(*_checked(A, b, C, d))
+
+    def _hold(self, A: Floats, b: Floats, C: Floats, d: Floats) -> bool:
+        """Take copies of A and b, as bytes that nobody can write, and C and d as they are; not if A, b is infinite."""
+        (m, n), rows, sides = A.shape, A.tobytes(), b.tobytes()
+        seen = _look(n, m, rows, sides)
+        if seen == _NOT_FINITE:
+            return False
+        own = self.__dict__
+        own["A"], own["b"] = np.ndarray((m, n), _FLOAT, rows), np.ndarray(m, _FLOAT, sides)
+        own["C"], own["d"] = C, d
+        own["in_core"], own["one_entry_a_row"] = (n, m, rows, sides), seen == _ONE_ENTRY_A_ROW
+        return True
 
     def __reduce__(self) -> tuple[type[Self], Table]:
         return type(self), self.table  # what is derived from them is derived again
@@ -91,9 +84,19 @@ class Rows(Value):
         return int(self.A.shape[1])
 
     @derived
+    def in_core(self) -> InCore:
+        """The rows of A and b as the core takes them."""
+        return self.dim, self.b.size, self.A.tobytes(), self.b.tobytes()
+
+    @derived
+    def one_entry_a_row(self) -> bool:
+        """Whether no row of A has more than one entry."""
+        return bool(_look(*self.in_core) == _ONE_ENTRY_A_ROW)
+
+    @derived
     def prepared(self) -> PreparedRows | None:
         """The rows prepared by the core, where it settles at once that a ball fits in."""
-        return None if self.d.size else PreparedRows.of(self.A, self.b)
+        return None if self.d.size else PreparedRows.of(self.A, self.b, self.in_core)
 
     @derived
     def program(self) -> Program:
@@ -103,7 +106,7 @@ class Rows(Value):
     @derived
     def as_box(self) -> Box | None:
         """The rows as a box, if they are one that is not empty."""
-        return Box.of(self.A, self.b, self.C)
+        return Box.of(self.in_core) if self.one_entry_a_row and not self.d.size else None
 
     @derived
     def decided(self) -> Emptiness:
@@ -139,7 +142,7 @@ class Rows(Value):
         """The generators in integers, where the set is computed with in integers; see `exact_generators`."""
         if self.prepared is not None and not self.short and self.wide:
             return None
-        return exact_generators(self.A, self.b, self.C, self.d, self.program, self.made_of)
+        return exact_generators(*self.table, self.short, self.program, self.made_of)
 
     @derived
     def made_of(self) -> ExactGenerators | None:
@@ -150,12 +153,12 @@ class Rows(Value):
     @derived
     def corners(self) -> Corners | None:
         """The vertices of a bounded full-dimensional set of short rows; see `short_sets`."""
-        return None if self.d.size or not maybe_short(self.A, self.b) else short_vertices(self.A, self.b)
+        return short_vertices(self.in_core) if self.short and not self.d.size else None
 
     @derived
     def short(self) -> bool:
         """Whether all rows are of few bits."""
-        return (not self.b.size or maybe_short(self.A, self.b)) and is_short(*self.table)
+        return has_short_rows(self.in_core) and (not self.d.size or is_short(self.C, self.d))
 
     @derived
     def listed(self) -> Floats | None:
@@ -167,18 +170,42 @@ class Rows(Value):
         return type(self)(A, b, self.C, self.d)
 
 
-def _as_they_are(A: Any, b: Any) -> Table | None:
-    """Read-only copies of finite arrays of floats that fit, in a fraction of the time; None: look closely."""
+def _are_arrays(A: Any, b: Any) -> bool:
+    """Whether they are arrays of floats that fit, as most are; anything else takes a closer look."""
     if type(A) is not np.ndarray or type(b) is not np.ndarray or not A.dtype == b.dtype == _FLOAT:
-        return None
-    if A.ndim != 2 or b.ndim != 1 or len(A) != len(b) or not A.shape[1]:
-        return None
-    rows, rhs = A.copy(), b.copy()
-    if not isfinite(np.vdot(rows, rows) + np.vdot(rhs, rhs)):  # squares may also leave the floats
-        return None
-    rows.setflags(write=False)
-    rhs.setflags(write=False)
-    return rows, rhs, *no_equalities(rows.shape[1])
+        return False
+    return A.ndim == 2 and b.ndim == 1 and len(A) == len(b) and A.shape[1] > 0
+
+
+def _hold_nothing(C: Any, d: Any, n: int) -> bool:
+    """Whether equalities were not given, or none in R^n."""
+    if C is None or d is None:
+        return C is d
+    return type(C) is np.ndarray and type(d) is np.ndarray and C.shape == (0, n) and d.shape == (0,)
+
+
+def _checked(A: ArrayLike, b: ArrayLike, C: ArrayLike | None, d: ArrayLike | None) -> Table:
+    """What was given as arrays that fit, without the rows that bound nothing."""
+    if hold_fractions(A, b):
+        A, b = rows_of_floats("Ab", dense(A), b)
+    if hold_fractions(C, d):
+        C, d = rows_of_floats("Cd", dense(C), d)
+    rows = real_array("A", dense(A), ("m", "n"))
+    m, n = rows.shape
+    if n == 0:
+        raise ValueError(f"A has shape {rows.shape}; expected at least one column. Use shape (0, n) for no rows.")
+    rhs = real_array("b", b, (m,), meaning="one entry per row of A", finite=False)
+    if np.count_nonzero(np.isfinite(rhs)) < m:
+        rows, rhs = _bounding(rows, rhs)
+    if (C is None) != (d is None):
+        raise ValueError("C and d must be given together: the equalities are C x = d.")
+    if C is None or d is None:
+        return rows, rhs, *no_equalities(n)
+    fixed = real_array("C", dense(C), ("q", n), meaning="one column per column of A")
+    values = real_array("d", d, (len(fixed),), meaning="one entry per row of C")
+    fixed.setflags(write=False)
+    values.setflags(write=False)
+    return rows, rhs, fixed, values
 
 
 @lru_cache(256)

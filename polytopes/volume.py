@@ -65,7 +65,7 @@ def _of_simplices(P: Rows) -> float | None:
     """The volume as a sum of those of simplices, where a ball fits in that is large beside their rounding."""
     if P.prepared is None:
         return None
-    return short_volume(P.A, P.b) if P.short else summed_volume(P.prepared)
+    return short_volume(P.in_core) if P.short else summed_volume(P.prepared)
 
 
 def _of_generators(P: ExactGenerators) -> float:

@@ -80,8 +80,8 @@ static void homogenise(Cone *cone, const Prepared *set)
     cone->inner[d] = 1.0;
 }
 
-/* Vertices (room, d) of a prepared set that is bounded: their number, or why not. wide, apart: as fractions of the size of
- * b, the radius of a largest ball and the distance of a vertex from a row from which rounding does not matter. volume: of
+/* Vertices (room, d) of a prepared set that is bounded, in lexicographic order: their number, or why not. wide, apart: as
+ * fractions of the size of b, the radius of a largest ball and the distance of a vertex from a row from which rounding does not matter. volume: of
  * the set, -1 if it has too many simplices; or NULL, if nobody asks.
  */
 EXPORTED integer fdi_prepared_vertices(integer d, integer m, double *prepared, double wide, double apart, integer room,
@@ -101,6 +101,7 @@ EXPORTED integer fdi_prepared_vertices(integer d, integer m, double *prepared, d
     }
     for (integer r = 0; r < count; r++)
         for (integer j = 0; j < d; j++) points[r * d + j] = times_power(points[r * d + j], set.s[j]);
+    if (count > 0) put_in_order(d, count, points, cone.rays);
     return count;
 }
 

@@ -1,4 +1,7 @@
-/* Boxes: rows with one entry each. Their bounds, a point, and their supports need no program. */
+/* Boxes: rows with one entry each. Their bounds, a point, and their supports need no program.
+ *
+ * And what rows are at a look: every set asks for it as it is made.
+ */
 #include "polytopes/polytopes.h"
 #include "polytopes/sums.h"
 #include "vectors.h"
@@ -46,12 +49,28 @@ static int take_row(const double *row, double b, integer n, double *lower, doubl
     return 1;
 }
 
+/* Rows A (m, n), b (m,) at a look: 0 if a number is not finite, 1 if a row has two entries or more, else 2. */
+EXPORTED integer fdi_look(integer n, integer m, const double *A, const double *b)
+{
+    integer found = 2;
+    for (integer i = 0; i < m; i++) {
+        integer entries = 0;
+        for (integer j = 0; j < n; j++) {
+            if (!isfinite(A[i * n + j])) return 0;
+            entries += A[i * n + j] != 0.0;
+        }
+        if (!isfinite(b[i])) return 0;
+        if (entries > 1) found = 1;
+    }
+    return found;
+}
+
 /* Whether rows A (m, n), b (m,) are those of a box that is not empty.
  *
  * If so, bounds holds its lower and upper corner, rounded outward, infinite where there is none, and a point that
  * satisfies every row exactly: (3, n), and 2 n more to work in.
  */
-EXPORTED integer fdi_box(integer m, integer n, const double *A, const double *b, double *bounds)
+EXPORTED integer fdi_box(integer n, integer m, const double *A, const double *b, double *bounds)
 {
     double *lower = bounds, *upper = lower + n, *point = upper + n, *most_lower = point + n;
     double *least_upper = most_lower + n;

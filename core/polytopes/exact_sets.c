@@ -46,6 +46,30 @@ EXPORTED integer fdi_integer_rows(integer m, integer d, const double *table, int
     return 1;
 }
 
+/* Whether rows A (m, n), b (m,) are short, of integers below 2^32; for points, whose b is one, without it. (n + 1,) to
+ * work in. */
+EXPORTED integer fdi_short(integer n, integer m, const double *A, const double *b, double *block)
+{
+    Memory memory = {block, 0};
+    integer *row = integers(&memory, n + 1);
+    for (integer i = 0; i < m; i++)
+        if (!integer_row(A + i * n, b ? b[i] : 1.0, n + 1, BITS_OF_ENTRIES, row)) return 0;
+    return 1;
+}
+
+/* The exponent of a power of two of which all of some numbers are multiples, up to 2^32 times; 0 where they are so far
+ * apart that there is none, or about one. */
+EXPORTED integer fdi_short_unit(integer count, const double *values)
+{
+    integer low = 10000, high = -10000;
+    for (integer i = 0; i < count; i++) {
+        if (values[i] == 0.0) continue;
+        low = least(last_bit(values[i]), low), high = most(exponent_of(values[i]), high);
+        if (high - low > BITS_OF_ENTRIES) return 0;
+    }
+    return low >= -BITS_OF_ENTRIES && high <= BITS_OF_ENTRIES ? 0 : high > low ? low : 0;
+}
+
 EXPORTED integer fdi_exact_set_room(integer n, integer m, integer room)
 {
     return (n + 1) * (m + 1) + (n + 1) * room + fdi_pointed_cone_room(n + 1, m + 1, room);
@@ -69,7 +93,8 @@ static Work lay_out(double *block, integer n, integer m, integer room)
     return work;
 }
 
-/* Vertices (room, n) of a bounded set A x <= b, rows (m, n) and (m,), to the nearest floats: their number, or why not.
+/* Vertices (room, n) of a bounded set A x <= b, rows (m, n) and (m,), to the nearest floats, in lexicographic order: their
+ * number, or why not.
  *
  * said (2,): whether they are floats, so that nothing was rounded; and, unless it is zero before, the volume of their
  * hull, -1 if it has too many simplices.
@@ -97,6 +122,7 @@ EXPORTED integer fdi_exact_vertices(integer n, integer m, const double *A, const
         const uint64_t *on = rows_of_rays(d, m + 1, room, work.rest);
         said[1] = volume_of(n, m + 1, count, points, on, (m + 64) / 64, block + fdi_exact_set_room(n, m, room));
     }
+    if (count > 0) put_in_order(n, count, points, (double *)(void *)work.rays);
     return count == 0 ? OVERFLOWS : count;
 }
 

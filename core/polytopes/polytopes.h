@@ -14,6 +14,7 @@
  * cone.c         extreme rays of cones in general position, proven in floats
  * near_cone.c    extreme rays of cones that are not in general position, in floats
  * bounded_sets.c vertices of rows, rows of points and volumes, in floats
+ * order.c        lists of points in order
  * volume.c       volume by the vertices and the rows that they lie on
  * double_description.c  extreme rays of any pointed cone, in integers
  * pointed_cone.c  where that begins: the order of rows, a basis, its rays
@@ -132,6 +133,9 @@ integer near_points(integer d, integer m, const double *at, const double *centre
 integer volume_room(integer n, integer m, integer k);
 double volume_of(integer n, integer m, integer k, const double *points, const uint64_t *on, integer row_words,
                  double *block);
+
+/* order.c */
+void put_in_order(integer n, integer k, double *points, double *work);
 
 /* duality.c */
 void fdi_gaps(integer d, integer k, const double *forms, const double *points, const double *bounds,

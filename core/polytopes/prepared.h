@@ -6,6 +6,7 @@
 
 typedef struct {
     double *radius, *size;        /* of a largest ball, of the largest entry of b */
+    double *point;                /* (d,) its centre as the user sees it */
     double *at, *b, *norms;       /* (d, m), (m,), (m,) */
     double *centre, *multipliers; /* (d,), (m,) of the largest ball */
     double *reach;                /* (d,) |x| is at most so much; NaN first: not asked for yet */
@@ -16,6 +17,7 @@ static inline integer lay_out_prepared(Prepared *set, double *block, integer d, 
 {
     Memory memory = {block, 0};
     set->radius = doubles(&memory, 1), set->size = doubles(&memory, 1);
+    set->point = doubles(&memory, d);
     set->at = doubles(&memory, d * m), set->b = doubles(&memory, m), set->norms = doubles(&memory, m);
     set->centre = doubles(&memory, d + 1), set->multipliers = doubles(&memory, m), set->reach = doubles(&memory, d);
     set->s = integers(&memory, d), set->r = integers(&memory, m), set->rest = integers(&memory, m + 2);

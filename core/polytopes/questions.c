@@ -37,6 +37,7 @@ EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const do
     const Rows all = {d, m, m, set.at, set.b};
     *set.radius = found[d], *set.size = scale_of(&all), set.reach[0] = NAN;
     copy(set.centre, found, d);
+    for (integer j = 0; j < d; j++) set.point[j] = times_power(found[j], set.s[j]);
     copy(set.multipliers, found + d + 1, m);
     if (status != OPTIMAL || !(found[d] > least_ball * *set.size)) return 0;
     return fdi_strictly_inside(d, m, set.at, set.b, set.centre, NULL, NULL, scratch);

@@ -88,7 +88,7 @@ block = kernel.allocate(size)
 """
 FAULTS = {
     "a result that is too short": ("native.function('fdi_box', native.Integer, native.Integer, *[native.Entries] * 3)"
-                                   "(1, 2, np.ones((1, 2)), np.ones(1), np.empty(1))", "heap-buffer-overflow"),
+                                   "(2, 1, np.ones((1, 2)), np.ones(1), np.empty(1))", "heap-buffer-overflow"),
     "a row beyond the last": ("kernel.initialise(block.address, np.ones((9, 1)), np.ones(9), np.ones(9))",
                               "use-after-poison"),
     "a sum that overflows": ("block.arrays['clock'][:2] = 2**63 - 1; block.arrays['clock'][3] = 1; "

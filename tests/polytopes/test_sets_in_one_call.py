@@ -11,10 +11,11 @@ from polytopes.checks import Floats
 from polytopes.exact_generators import integer_form
 from polytopes.exact_sides import exact_form
 from polytopes.general_position import rows_around, summed_volume
-from polytopes.integers import floats_of_points, integer_rows
+from polytopes.integers import floats_of_points, integer_rows, is_short
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
 from polytopes.outward import float_rows
-from polytopes.short_sets import short_hull, short_vertices, short_volume
+from polytopes.rows import Rows
+from polytopes.short_sets import are_short, has_short_rows, short_hull, short_unit, short_vertices, short_volume
 
 
 def short_rows(rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -26,13 +27,32 @@ def short_rows(rng: np.random.Generator) -> tuple[Floats, Floats]:
     return np.ldexp(A, int(rng.integers(-20, 20))), np.ldexp(b[: len(A)], int(rng.integers(-3, 4)))
 
 
+def test_rows_and_points_are_short_as_their_integers_of_any_size_say() -> None:
+    rng, short = np.random.default_rng(12), np.zeros(2, int)
+    for _ in range(300):
+        table = rng.integers(-(2**34), 2**34, (3, 3)) >> rng.integers(0, 34, (3, 3))
+        table = np.ldexp(table.astype(float), rng.integers(-4, 5, (3, 1)))
+        told = has_short_rows(Rows(table[:, :2], table[:, 2]).in_core), are_short(table)
+        assert told == (is_short(table[:, :2], table[:, 2]), is_short(table, np.ones(3)))
+        short += told
+    assert (short > 30).all()
+    assert (short < 270).all()
+
+
+@pytest.mark.parametrize(("values", "unit"), [
+    ([0.0, 0.0], 0), ([3.0, 0.5], 0), ([2.0**-40, 3.0], 0), ([3 * 2.0**-40, 0.0, 2.0**-38], -40), ([2.0**50, 0.0], 50),
+])  # fmt: skip
+def test_the_unit_of_short_points(values: list[float], unit: int) -> None:
+    assert short_unit(np.array([values])) == unit
+
+
 def test_vertices_of_short_rows_are_those_in_integers_of_any_size() -> None:
     rng, known = np.random.default_rng(0), 0
     for _ in range(200):
         A, b = short_rows(rng)
         A, b = A[: len(b)], b[: len(A)]
         exact = generators_of(integer_form(A, b, A[:0], b[:0]))
-        found = short_vertices(A, b)
+        found = short_vertices(Rows(A, b).in_core)
         if found is None:
             assert len(exact.rays) or len(exact.lines) or not len(exact.vertices)
             continue
@@ -64,10 +84,10 @@ def test_hulls_of_short_points_are_those_in_integers_of_any_size() -> None:
 
 
 def test_numbers_that_do_not_fit_are_left_to_larger_integers() -> None:
-    assert short_vertices(np.array([[1.0], [-1.0]]), np.array([0.1, 0.0])) is None
+    assert short_vertices(Rows([[1.0], [-1.0]], [0.1, 0.0]).in_core) is None
     assert short_hull(np.array([[0.1], [0.2]])) is None
     large = np.array([[2.0**31 - 1, 1.0], [1.0, 2.0**31 - 1], [-(2.0**31 - 3), 3.0], [5.0, -(2.0**31 - 5)]])
-    assert short_vertices(large, np.array([2.0**31 - 7, 3.0, 5.0, 2.0**31 - 9])) is None
+    assert short_vertices(Rows(large, [2.0**31 - 7, 3.0, 5.0, 2.0**31 - 9]).in_core) is None
     P = HPolytope(large, np.array([2.0**31 - 7, 3.0, 5.0, 2.0**31 - 9]))
     assert [tuple(map(float, v)) for v in P.vertices(exact=True)] == [tuple(v) for v in P.vertices().tolist()]
 
@@ -141,12 +161,12 @@ def test_volumes_of_short_sets_are_right() -> None:
     for _ in range(60):
         A, b = short_rows(rng)
         A, b = A[: len(b)], b[: len(A)]
-        volume = short_volume(A, b)
+        volume = short_volume(Rows(A, b).in_core)
         if volume is not None:
             found += 1
             assert volume == pytest.approx(float(HPolytope(A, b).volume(exact=True)), rel=1e-13)
     assert found > 15
-    assert short_volume(np.vstack([np.eye(9), -np.eye(9)]), np.ones(18)) is None  # 9! simplices
+    assert short_volume(HPolytope.box(-np.ones(9), np.ones(9)).in_core) is None  # 9! simplices
     assert HPolytope.cross_polytope(5).volume() == pytest.approx(2.0**5 / 120.0, rel=1e-14)
 
 

@@ -3,7 +3,7 @@
 #include "polytopes/sums.h"
 #include "vectors.h"
 
-integer fdi_box(integer m, integer n, const double *A, const double *b, double *bounds);
+integer fdi_box(integer n, integer m, const double *A, const double *b, double *bounds);
 integer fdi_box_supports(integer n, integer k, const double *bounds, const double *directions, double *values);
 
 enum { N = 3 };
@@ -16,7 +16,7 @@ static void corners(void)
         A[i * N + i / 2] = (i % 2 ? -1.0 : 1.0) * (0.1 + fabs(uniform()));
         b[i] = fabs(uniform());
     }
-    CHECK(fdi_box(2 * N, N, A, b, bounds) == 1);
+    CHECK(fdi_box(N, 2 * N, A, b, bounds) == 1);
     for (integer j = 0; j < N; j++) {
         const long double high = (long double)b[2 * j] / A[2 * j * N + j];
         const long double low = (long double)b[2 * j + 1] / A[(2 * j + 1) * N + j];
@@ -47,9 +47,9 @@ static void what_is_none(void)
     const double askew[] = {1.0, 1.0}, twice[] = {1.0, -1.0}, apart[] = {-1.0, -1.0}, touching[] = {1.0, -1.0};
     const double far[] = {1e200}, one[] = {1.0}, third[] = {3.0}, zero[] = {0.0}, minus[] = {-1.0};
     double bounds[10];
-    CHECK(fdi_box(1, 2, askew, one, bounds) == 0);
-    CHECK(fdi_box(2, 1, twice, apart, bounds) == 0);   /* empty */
-    CHECK(fdi_box(2, 1, twice, touching, bounds) == 1); /* a point */
+    CHECK(fdi_box(2, 1, askew, one, bounds) == 0);
+    CHECK(fdi_box(1, 2, twice, apart, bounds) == 0);   /* empty */
+    CHECK(fdi_box(1, 2, twice, touching, bounds) == 1); /* a point */
     CHECK(bounds[0] == 1.0 && bounds[1] == 1.0 && bounds[2] == 1.0);
     CHECK(fdi_box(1, 1, one, far, bounds) == 0);
     CHECK(fdi_box(1, 1, zero, minus, bounds) == 0);
