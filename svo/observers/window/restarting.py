@@ -300,7 +300,7 @@ def _repeated(samples: list[Reading], window: Window) -> VerdictName:
     """Samples through a new window; the verdict is about the last one."""
     verdict: VerdictName = "undecided"
     for j, s in enumerate(samples):
-        window.proof = None  # by fewer readings than bound the first state: no proof
+        window.forget_proof()  # by fewer readings than bound the first state: no proof
         u = samples[j - 1].u if j else s.u
         verdict = window.take(Sample(u, s.u, s.y, s.stack, s.noise, s.w_lower, s.w_upper, s.y))
     return verdict

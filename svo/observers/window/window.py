@@ -6,36 +6,31 @@ keeps. All in normal form.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from time import perf_counter
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from svo.checks import Array
-from svo.models.normal_form import ENORMOUS
 from svo.observers import window_kernel as kernel
-from svo.observers.answers import NO_PROOF, OUT_OF_TIME, VerdictName
-from svo.observers.given_units import window_out
+from svo.observers.answers import VerdictName
 from svo.observers.readings import OUTSIDE
 from svo.observers.relinearised_kernel import BOX_WITHOUT_ROOM, TAKEN, WITHOUT_ROOM, Followed, PlantSamples
 from svo.observers.saved_state import arrays_of, take_exactly
-from svo.observers.window.certificate import WindowCertificate, certificate_of
+from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.evidence import ArrivalSet
-from svo.observers.window.fallback import candidates, is_feasible
 from svo.observers.window.log_samples import LogSamples
 from svo.observers.window.memory import FIXED, Memory, WindowSettings
+from svo.observers.window.programs import Programs
 from svo.observers.window.relinearised import Relinearised
 from svo.observers.window.sample import Outgrown, Sample, check_entry
-from svo.observers.window.sign_split import SplitCertificate, SplitPrograms
+from svo.observers.window.sign_split import SplitCertificate
 
 Taken = tuple[int, int, int]
 """What the kernel tells of a sample that it took: code, verdict, program that found the window empty."""
 
 _NO_END = 1 << 30  # samples
-_PIVOTS_BETWEEN_LOOKS = 8  # at the clock: some 20 microseconds
 
 
 class Prover(Protocol):
@@ -66,14 +61,6 @@ class Window:
         Whether the anchor follows from the window's own readings.
     prover : Prover, optional
         Convex hulls are then kept, and programs solved one by one.
-
-    Attributes
-    ----------
-    memory : Memory
-    proof : WindowCertificate, SplitCertificate or None
-        That the window is empty, about the model and the data as given.
-    reason : str or None
-        Why the newest verdict is "undecided", where that is known.
     """
 
     def __init__(
@@ -87,13 +74,26 @@ class Window:
     ) -> None:
         self.settings, self.anchor, self.origin, self.free, self.prover = settings, anchor, origin, free, prover
         self._model, self._injection = settings.form.model, settings.injection
-        self.memory = Memory(settings, len(anchor.rows), settings.first_steps if steps is None else steps)
+        memory = Memory(settings, len(anchor.rows), settings.first_steps if steps is None else steps)
+        self._programs = Programs(settings, memory, anchor, origin, free)
         n, arrays = self._model.n_states, self.memory.arrays
         arrays["h_lower"][:n], arrays["h_upper"][:n] = anchor.box_lower, anchor.box_upper
         kernel.initialise(self.memory.address, anchor.rows, anchor.lower, anchor.upper)
-        self.proof: WindowCertificate | SplitCertificate | None = None
-        self.reason: str | None = None
-        self._given: Array | None = None  # the newest reading
+
+    @property
+    def memory(self) -> Memory:
+        """Its samples, and the state of its programs."""
+        return self._programs.memory
+
+    @property
+    def proof(self) -> WindowCertificate | SplitCertificate | None:
+        """That the window is empty, about the model and the data as given."""
+        return self._programs.proof
+
+    @property
+    def reason(self) -> str | None:
+        """Why the newest verdict is "undecided", where that is known."""
+        return self._programs.reason
 
     # -- samples -----------------------------------------------------------------------------------
 
@@ -115,7 +115,7 @@ class Window:
     @property
     def stopped(self) -> int:
         """Programs that ended at a limit."""
-        return int(self.memory.arrays["clock"][kernel.STOPS])
+        return self._programs.stopped
 
     def take(self, sample: Sample, end: float | None = None) -> VerdictName:
         """The next sample, by the time ``end`` if there is one; the window is unchanged if it raises ValueError.
@@ -127,14 +127,13 @@ class Window:
         Outgrown
             If the newest state has no bounds of use.
         """
-        memory, self.reason = self.memory, None
-        memory.check_whole()
+        memory = self._begun()
         if self._room == 0:
             memory = self._grow()
         if self._takes_whole and end is None:
             return self.concluded(memory.take(sample, self.settings.eps), sample.given)
         self._enter(sample, end)
-        return self._cut_arrival(self._decide(end))
+        return self._cut_arrival(self._decided(end))
 
     def take_many(self, samples: LogSamples, boxes: Array | None) -> tuple[int, Taken]:
         """The next samples, as many as are simply consistent; `concluded` says what became of the one after them.
@@ -146,15 +145,13 @@ class Window:
         boxes : (k, 2, n) array, optional
             Filled with the boxes of the states at the samples that are consistent.
         """
-        memory, eps, self.reason = self.memory, self.settings.eps, None
-        memory.check_whole()
+        memory, eps = self._begun(), self.settings.eps
         done, told = kernel.follow(memory.address, samples, eps, kernel.UNLIMITED, boxes)
         return done, memory.go_on(told, eps)
 
     def take_relinearised(self, plant: Relinearised, samples: PlantSamples, boxes: Array | None) -> Followed:
         """As `take_many`, of a nonlinear plant; the sample after them is not taken where it is not linearised."""
-        memory, eps, self.reason = self.memory, self.settings.eps, None
-        memory.check_whole()
+        memory, eps = self._begun(), self.settings.eps
         found, count = plant.follow(memory.address, samples, eps, boxes), len(samples.T)
         while found.end in (WITHOUT_ROOM, BOX_WITHOUT_ROOM):
             memory.enlarge(2 * memory.size.K)
@@ -165,7 +162,7 @@ class Window:
             found = rest._replace(done=done + rest.done)
         if found.done < count and found.end == TAKEN:
             found = found._replace(told=memory.go_on(found.told, eps))
-        self._given = samples.y[min(found.done, count - 1)]
+        self._programs.given = samples.y[min(found.done, count - 1)]
         return found
 
     @property
@@ -188,11 +185,10 @@ class Window:
         """
         code, found, program = told
         check_entry(code)
-        self._given = given
+        self._programs.given = given
         if code == kernel.OUTGROWN:
             raise Outgrown
-        verdict = "consistent" if found == kernel.CONSISTENT else self._conclude(kernel.ARRIVAL, found, program)
-        return self._cut_arrival(verdict)
+        return self._cut_arrival(self._programs.conclude(kernel.ARRIVAL, found, program))
 
     @property
     def _takes_whole(self) -> bool:
@@ -227,18 +223,30 @@ class Window:
 
     def add_late(self, y: Array, sample: int) -> VerdictName:
         """A measurement of a sample that is still there."""
-        own, memory, self.reason = sample - self.origin, self.memory, None
+        own, memory, self._programs.reason = sample - self.origin, self.memory, None
         memory.arrays["in_y"][:] = y
         kernel.add_late(memory.address, own, self.settings.eps)
         if self._injection is not None:  # the sample was incomplete, so it is as it was given
             s, arrays = own % (memory.size.N + 1), memory.arrays
             arrays["given.y"][s], arrays["given.slack"][s] = arrays["y"][s], arrays["slack"][s]
-        return self._cut_arrival(self._decide(None))
+        return self._cut_arrival(self._decided(None))
 
     def read_at(self, sample: int) -> Array:
         """What was read at a sample that is still there."""
         read: Array = self.memory.arrays["y"][(sample - self.origin) % (self.memory.size.N + 1)]
         return read
+
+    def solve(self, task: int) -> VerdictName:
+        """Solve the programs of a task."""
+        return self._programs.solve(task)
+
+    def certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
+        """As `Programs.certificate`."""
+        return self._programs.certificate(objective)
+
+    def forget_proof(self) -> None:
+        """Of a falsification that is none of the observer's."""
+        self._programs.proof = None
 
     def newest_bounds(self) -> tuple[Array, Array]:
         """Bounds of the newest state along the axes, then the template."""
@@ -258,45 +266,6 @@ class Window:
         blur: Array = self.settings.eps * np.abs(stack[0, n:, :n]) @ np.maximum(width, 0.0)
         return blur
 
-    # -- proofs --------------------------------------------------------------------------------------
-
-    def certificate(self, objective: tuple[int, Array] | None = None) -> WindowCertificate:
-        """Of the multipliers at hand, about the model and the data as given.
-
-        ``objective`` is a sample of the window, as the kernel counts, and a direction, in normal form, whose bound is
-        to be proven.
-        """
-        arrays, size = self.memory.arrays, self.memory.size
-        if self._injection is not None:
-            found = self._injection.certificate(arrays, size, self._arrival(), objective)
-        else:
-            found = certificate_of(arrays, size, self._arrival())
-        found = replace(found, first=found.first + self.origin, last=found.last + self.origin)
-        out, beyond = window_out(found, self.settings.form), np.abs(found.samples[-1].y) == ENORMOUS
-        if self._given is None or not beyond.any():
-            return out
-        newest = replace(out.samples[-1], y=np.where(beyond, self._given, out.samples[-1].y))
-        return replace(out, samples=(*out.samples[:-1], newest))
-
-    def _arrival(self) -> ArrivalSet:
-        if self.memory.base == 0:
-            return self.anchor
-        n, arrays = self._model.n_states, self.memory.arrays
-        lower, upper = arrays["h_lower"].copy(), arrays["h_upper"].copy()
-        return ArrivalSet(lower[:n], upper[:n], self.settings.template, lower[n:], upper[n:])
-
-    def _prove(self) -> bool:
-        """Whether the multipliers at hand prove in exact arithmetic that the window is empty; keeps the proof."""
-        self.proof = next((statement for statement in self._statements() if statement.verify()), None)
-        return self.proof is not None
-
-    def _statements(self) -> Iterator[WindowCertificate]:
-        """What the multipliers may prove: of a window that its readings alone began, first without any arrival set."""
-        certificate = self.certificate()
-        if self.free and self.memory.base == 0:
-            yield replace(certificate, arrival=ArrivalSet.unknown(self._model.n_states), on_arrival=np.zeros(0))
-        yield certificate
-
     # -- saved states ----------------------------------------------------------------------------------
 
     def state(self) -> dict[str, NDArray]:
@@ -315,19 +284,26 @@ class Window:
             if not np.array_equal(array, self.memory.arrays[name]):
                 raise ValueError(f"{name} is not that of its model and options")
         if falsified:
-            if self.settings.sign_split:
-                self.solve(kernel.ARRIVAL)
-            self.proof = self.proof or next(self._statements())
-            if not self.proof.verify():
-                raise ValueError("its falsification cannot be proven again")
+            self._programs.prove_again()
 
     # -- what a sample comes to --------------------------------------------------------------------------
+
+    def _begun(self) -> Memory:
+        """The memory, before it is given the next sample."""
+        self._programs.reason = None
+        self.memory.check_whole()
+        return self.memory
+
+    def _decided(self, end: float | None) -> VerdictName:
+        prover = self.prover
+        shown = None if prover is None else lambda program: prover.arrival(self, program)
+        return self._programs.decide(end, shown)
 
     def _grow(self) -> Memory:
         smaller = self.memory
         larger = Memory(self.settings, len(self.anchor.rows), 2 * smaller.size.N, least_basis=smaller.size.K)
         larger.copy_from(smaller)
-        self.memory = larger
+        self._programs.memory = larger
         return larger
 
     def _hand_over(self, sample: Sample) -> None:
@@ -348,7 +324,7 @@ class Window:
         self._hand_over(entered)
         code = kernel.enter(memory.address)
         check_entry(code)
-        self._given = sample.given
+        self._programs.given = sample.given
         self._settle_channels(code == kernel.SIGN_OPEN, False, is_first, end)
         code, s = kernel.move(memory.address), memory.slot
         if self._injection is not None:
@@ -386,7 +362,7 @@ class Window:
                 arrays = self.memory.arrays  # a program may have moved them
                 is_open = sign_open and arrays["s_lower"][v, q] < 0.0 < arrays["s_upper"][v, q]
                 if is_open:
-                    self._solve_one(kernel.CHANNELS, 2 * q + side, end)
+                    self._programs.solve_one(kernel.CHANNELS, 2 * q + side, end)
                 if self.prover is not None:
                     self.prover.channel(self, q, side, is_open)
 
@@ -400,91 +376,4 @@ class Window:
         )
         if meets:
             return verdict
-        return self._undecided(OUTSIDE)  # not proven, so no alarm
-
-    # -- programs ----------------------------------------------------------------------------------------
-
-    def solve(self, task: int) -> VerdictName:
-        """Solve the programs of a task; an empty window counts only once its certificate is proven."""
-        memory = self.memory
-        if self.settings.sign_split:
-            split = SplitPrograms(memory, self.certificate, self.settings.sign_split)
-            if split.is_needed:
-                return self._solve_split(split, task)
-        verdict, program = memory.solve(task, 0, kernel.ALL, kernel.UNLIMITED)
-        return self._conclude(task, verdict, program)
-
-    def _decide(self, end: float | None) -> VerdictName:
-        """Whether anything explains the window, and the next arrival set."""
-        if end is None and self.prover is None:
-            return self.solve(kernel.ARRIVAL)
-        memory, decided = self.memory, False
-        is_full = memory.time - memory.base > memory.size.N - memory.size.block
-        for program in kernel.arrival_programs(memory.address):
-            verdict = self._solve_one(kernel.ARRIVAL, program, end)
-            if verdict == kernel.EMPTY_CANDIDATE and self._prove():
-                return "falsified"
-            decided = decided or verdict == kernel.CONSISTENT
-            if self.prover is not None and is_full:
-                self.prover.arrival(self, program)
-        if end is None:
-            return "consistent" if decided else self._ask_highs()
-        if memory.time - memory.base == memory.size.N:
-            memory.arrays["clock"][kernel.PENDING] = 1
-        return "consistent" if decided else self._undecided(OUT_OF_TIME)
-
-    def _conclude(self, task: int, verdict: int, program: int) -> VerdictName:
-        """What the programs of a task say; those after one that found the window empty have yet to be solved."""
-        memory = self.memory
-        while verdict == kernel.EMPTY_CANDIDATE:
-            if task == kernel.ARRIVAL and self._prove():
-                return "falsified"
-            after = program + 1
-            verdict, program = memory.solve(task, after, kernel.ALL, kernel.UNLIMITED)
-        if verdict == kernel.CONSISTENT:
-            return "consistent"
-        return self._ask_highs() if task == kernel.ARRIVAL else "undecided"
-
-    def _solve_one(self, task: int, program: int, end: float | None) -> int:
-        """One program, its pivots in portions until it is decided or the time ``end`` is reached, if there is one."""
-        memory, stopped = self.memory, self.stopped
-        while True:
-            over = end is None or perf_counter() >= end
-            portion = kernel.UNLIMITED if end is None else 0 if over else _PIVOTS_BETWEEN_LOOKS
-            verdict, _ = memory.solve(task, program, program + 1, portion)
-            if over or verdict != kernel.UNDECIDED:
-                memory.arrays["clock"][kernel.STOPS] = min(self.stopped, stopped + (verdict == kernel.UNDECIDED))
-                return int(verdict)
-
-    def _solve_split(self, split: SplitPrograms, task: int) -> VerdictName:
-        """As `solve`, each program over its cells."""
-        memory = self.memory
-        fixed = {kernel.NEWEST: range(2 * memory.size.nt), kernel.QUERY: range(1)}
-        prefix = {kernel.ARRIVAL: "new", kernel.NEWEST: "now"}.get(task)
-        has_point = False
-        for program in fixed.get(task) or kernel.arrival_programs(memory.address):
-            sign = 1.0 - 2.0 * (program % 2)
-            name = "answer" if prefix is None else f"{prefix}_{'lower' if program % 2 else 'upper'}"
-            at = 0 if prefix is None else program // 2
-            result = split.solve(task, program, lambda t=name, i=at, s=sign: float(s * memory.arrays[t][i]))  # type: ignore[misc]
-            has_point = has_point or result.has_point
-            if result.proof is None:
-                memory.arrays[name][at] = sign * result.value
-            elif task == kernel.ARRIVAL and result.proof.verify():
-                self.proof = result.proof
-                return "falsified"
-        return "consistent" if has_point else self._undecided(NO_PROOF)
-
-    def _ask_highs(self) -> VerdictName:
-        arrays = self.memory.arrays
-        feasible, ray = is_feasible(arrays["G"], arrays["lower"], arrays["upper"])
-        if feasible is False:
-            for multipliers in candidates(ray):
-                arrays["farkas"][:] = multipliers
-                if self._prove():
-                    return "falsified"
-        return "consistent" if feasible else self._undecided(NO_PROOF)
-
-    def _undecided(self, why: str) -> VerdictName:
-        self.reason = why
-        return "undecided"
+        return self._programs.undecided(OUTSIDE)  # not proven, so no alarm

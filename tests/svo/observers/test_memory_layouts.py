@@ -139,7 +139,7 @@ def through_pickle(memory: Memory) -> Memory:
 @pytest.mark.parametrize("copied", [through_pickle, copy.deepcopy])
 def test_a_copy_of_a_window_is_its_bytes_and_goes_on_by_itself(copied: Callable[[Memory], Memory]) -> None:
     observer, twin = observer_after_a_sample(), observer_after_a_sample()
-    observer._window.memory = copied(observer._window.memory)
+    observer._window._programs.memory = copied(observer._window.memory)
     assert observer._window.memory.address % 64 == 0
     for y in ([0.0, 0.05], [0.02, np.nan], [0.0, 0.1]):
         assert np.array_equal(observer.step([0.5], y).box, twin.step([0.5], y).box)
