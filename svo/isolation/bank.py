@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
-from time import perf_counter
 from types import MappingProxyType
 from typing import Any
 
@@ -16,13 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from polytopes import HPolytope
 from polytopes.shown import Picture, Shown, in_a_line
 from polytopes.signatures import options_by_name
-from svo.checks import Array, expect, expect_kind, expect_shape, is_count, is_finite_number
-from svo.isolation.bank_checks import check_observers
+from svo.checks import Array, expect_kind
+from svo.isolation.bank_checks import check_log, check_observers
 from svo.isolation.bank_state import BankState, Sample, restored, saved
 from svo.isolation.front import Front
 from svo.isolation.logic import GLOBAL, NOMINAL, IsolationLogic, LogicState
 from svo.isolation.record import BankRecord, Replay, Verdict
 from svo.isolation.recorder import Recorder
+from svo.isolation.running import Running
+from svo.isolation.starts import nothing_of, predict_from, start_from
 from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models import Labels
@@ -40,13 +41,10 @@ class Bank(Shown, ABC):
     observers : mapping of str to Observer
     """
 
-    _refused_by: str | None
-
     def __init__(self, logic: IsolationLogic, observers: Mapping[str, Observer], same_states: bool) -> None:
         self.names = logic.names
         self.observers: Mapping[str, Observer] = MappingProxyType(dict(observers))
         self._logic = logic
-        self._untimed = tuple(n for n, o in observers.items() if not o.takes_deadline)
         check_observers(self.observers, same_states)
         self._forget()
 
@@ -57,8 +55,9 @@ class Bank(Shown, ABC):
         return in_a_line(f"<{type(self).__name__} of {names:.200} {where}>")
 
     def _picture(self) -> Picture | None:
-        newest = {name: o._newest for name, o in self._running.items() if o._newest is not None}
-        sets = {name: step.set for name, step in newest.items() if step.sample == self._running[name]._number}
+        running = self._running.observers
+        newest = {name: o._newest for name, o in running.items() if o._newest is not None}
+        sets = {name: step.set for name, step in newest.items() if step.sample == running[name]._number}
         labels = Labels.of(self.observers[NOMINAL].model)
         return picture_of_sets(sets, self.names, labels.state_titles[:2])
 
@@ -99,7 +98,7 @@ class Bank(Shown, ABC):
         if self._sample is not None:
             raise ValueError("update was called after the first sample; use step(u=..., y=...), or reset(set) first")
         now = Sample.given(None, y0, u, schedule, u_range=u_range)
-        steps = self._ask(lambda name: now.first(self._running[name], now.y))
+        steps = self._running.ask(lambda name: now.first(self.observers[name], now.y))
         return self._conclude(0, steps, now)
 
     def step(
@@ -147,9 +146,9 @@ class Bank(Shown, ABC):
             raise ValueError("step was called before the first measurement; call update(y0=...), NaN if there is none")
         now = Sample.given(u, y, u_next, schedule, dt, u_range)
         if deadline is None:
-            steps = self._ask(lambda name: now.to(self._running[name], now.y))
+            steps = self._running.ask(lambda name: now.to(self.observers[name], now.y))
         else:
-            steps = self._timed_steps(now, deadline)
+            steps = self._running.ask_within(now, deadline)
         return self._conclude(self._sample + 1, steps, now)
 
     def late_update(self, y: ArrayLike, sample: int) -> Verdict:
@@ -175,45 +174,12 @@ class Bank(Shown, ABC):
         """
         if self._sample is None:
             raise ValueError("late_update was called before the first measurement; call update(y0=...) first")
-        taken = self._own_samples(sample, self._sample)
-        expect(
-            any(own is not None for own in taken.values()), "sample", sample, "one in the window of a running observer"
-        )
-        last = {name: observer.window[1] for name, observer in self._running.items()}
-
-        def late(name: str) -> Step:
-            own, observer = taken[name], self._running[name]
-            given = (self._nothing(), last[name]) if own is None else (y, own)
-            return observer.late_update(*given)
-
-        self._check_late(y, taken)
-        steps = self._ask(late)
+        steps = self._running.ask_late(y, sample, self._sample, self._nothing())
         falsified, _ = falsified_and_undecided(steps)
         state = replace(self._state, restart=())
         if falsified:  # only those count: the others had their answer at this sample
             state = self._logic.advance(state, self._sample, falsified, undecided=(*self.names, GLOBAL))
         return self._apply(self._sample, state, steps, falsified, self._latest)
-
-    def _check_late(self, y: ArrayLike, taken: Mapping[str, int | None]) -> None:
-        """Every observer that takes a late measurement is asked before any of them changes."""
-        for name, own in taken.items():
-            if own is not None:
-                try:
-                    self._running[name].check_late(y, own)
-                except ValueError as error:
-                    raise ValueError(f"observer {name!r}: {error}") from error
-
-    def _own_samples(self, sample: int, newest: int) -> dict[str, int | None]:
-        """The number that each running observer gives to a sample of the bank; None if its window does not hold it."""
-        expect(is_count(sample, 0), "sample", sample, "the number of a sample")
-        found: dict[str, int | None] = {}
-        for name, observer in self._running.items():
-            if not observer.takes_late:
-                raise TypeError(f"observer {name!r} ({type(observer).__name__}) takes no measurements that come late")
-            first, last = observer.window
-            own = sample - newest + last
-            found[name] = int(own) if first <= own <= last else None
-        return found
 
     def state_dict(self) -> dict[str, NDArray[Any]]:
         """Everything that the next samples depend on, as named arrays without objects (for ``numpy.savez``).
@@ -313,11 +279,11 @@ class Bank(Shown, ABC):
             return
         fronts = {
             name: Front(name, observer.follow(log, None if boxes is None else boxes[name], start=start))
-            for name, observer in self._running.items()
+            for name, observer in self._running.observers.items()
         }
         k = start
         while k < len(log):
-            running = [fronts[name] for name in self._running]
+            running = [fronts[name] for name in self._running.observers]
             count = min((front.plain() for front in running), default=len(log) - k)
             count = max(count, 1)
             k += count
@@ -377,44 +343,9 @@ class Bank(Shown, ABC):
 
     # -- inside ------------------------------------------------------------------------------------
 
-    def _timed_steps(self, now: Sample, deadline: float) -> dict[str, Step]:
-        if not (is_finite_number(deadline) and deadline > 0):
-            raise ValueError(f"deadline is {deadline}; expected seconds > 0, or None")
-        end = perf_counter() + deadline
-        for name in self._untimed:
-            raise ValueError(
-                f"deadline is given, but the step of observer {name!r} ({type(self.observers[name]).__name__}) has "
-                "none; leave the deadline out, or this observer"
-            )
-        left = iter(range(len(self._running), 0, -1))
-
-        def timed(name: str) -> Step:
-            share = max(0.0, end - perf_counter()) / next(left)
-            return now.to(self._running[name], now.y, deadline=share)
-
-        return self._ask(timed)
-
-    def _ask(self, call: Callable[[str], Step]) -> dict[str, Step]:
-        """The answers of the running observers."""
-        if self._refused_by is not None:
-            raise ValueError(
-                f"observer {self._refused_by!r} refused a sample that others had already seen; call reset(set), or "
-                "load_state_dict(state) of the sample before"
-            )
-        steps: dict[str, Step] = {}
-        for name in self._running:
-            try:
-                steps[name] = call(name)
-            except Exception as error:
-                self._refused_by = name if steps else None
-                if type(error) is ValueError:
-                    raise ValueError(f"observer {name!r}: {error}") from error
-                raise
-        return steps
-
     def _forget(self) -> None:
         self._sample: int | None = None
-        self._refused_by = None
+        self._running = Running(self.observers)
         self._largest_at: int | None = None  # what the set that observers start from rests on
         self._latest = Sample(None, self._nothing(), None)
         self._adopt(self._logic.initial())
@@ -432,12 +363,13 @@ class Bank(Shown, ABC):
         self._recall(state.memory)
         self._largest_at = int(state.memory["largest_at"]) if "largest_at" in state.memory else None
         self.observers = MappingProxyType(observers)
-        self._sample, self._latest, self._refused_by = state.sample, state.latest, None
+        self._running = Running(self.observers)
+        self._sample, self._latest = state.sample, state.latest
         self._adopt(state.logic)
 
     def _adopt(self, state: LogicState) -> None:
         self._state = state
-        self._running = {name: self.observers[name] for name in state.running}
+        self._running.choose(state.running)
 
     def _conclude(self, k: int, steps: dict[str, Step], now: Sample) -> Verdict:
         falsified, undecided = falsified_and_undecided(steps)
@@ -462,48 +394,18 @@ class Bank(Shown, ABC):
     def _start_from(
         self, name: str, set: HPolytope | None, at: Sample, y: ArrayLike | None = None, largest_at: int | None = None
     ) -> Step:
-        """Start an observer from a set of states at a sample; without y it only learns of inputs and schedule.
-
-        None is a set that is lost. ``largest_at`` is that of what the set rests on, counted from the sample.
-        """
-        observer = self.observers[name]
-        physical = observer.model.physical_range
-        if set is not None and physical is not None and not physical.cut(*set.bounding_box())[2]:
-            set = None  # no state of it is one of the plant, as nothing has proven yet
-        if set is not None:
-            observer.restart(set)
-            if largest_at is not None:
-                observer.largest_at = largest_at
-        elif observer.starts_without_set:
-            observer.lose_set()
-        else:
-            kind = type(observer).__name__
-            raise TypeError(f"observer {name!r} ({kind}) has no lose_set, and there is no bounded set to start it from")
-        return at.first(observer, self._nothing() if y is None else y)
+        """As `svo.isolation.starts.start_from`."""
+        return start_from(name, self.observers[name], set, at, y, largest_at)
 
     def _predict_from(self, name: str, set: HPolytope | None, now: Sample, largest_at: int | None) -> Step:
-        """Start from the set of the sample before, leaving out the measurement that nothing explains.
-
-        One that came late leaves the set of its verdict, which is of the present sample. ``largest_at`` is counted from
-        the present sample.
-        """
-        if now is self._latest:
-            return self._start_from(name, set, now, largest_at=largest_at)
-        self._start_from(name, set, self._latest, largest_at=None if largest_at is None else largest_at + 1)
-        return now.to(self.observers[name], self._nothing())
+        """As `svo.isolation.starts.predict_from`."""
+        return predict_from(name, self.observers[name], set, self._latest, now, largest_at)
 
     def _nothing(self) -> ArrayLike:
-        return np.full(self.observers[NOMINAL].model.n_outputs, np.nan)
+        return nothing_of(self.observers[NOMINAL])
 
     def _check_log(self, log: Log, start: int) -> None:
-        if start == 0 and self._sample is not None:
-            raise ValueError("run was called on a bank that has already started; call reset(set), or use a fresh bank")
-        if start > 0 and self._sample is None:
-            raise ValueError(f"start is {start}, but the bank has seen no sample; expected 0")
-        model = self.observers[NOMINAL].model
-        for name, wanted in (("u", model.n_inputs), ("y", model.n_outputs)):
-            array: Array = getattr(log, name)
-            expect_shape(array.shape[1] == wanted, f"log.{name}", array, f"(samples, {wanted}), as the models have")
+        check_log(log, self.observers[NOMINAL].model, start, self._sample is not None)
 
 
 def falsified_and_undecided(steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:

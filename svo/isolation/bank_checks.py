@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from svo.checks import expect, expect_kind, is_count
+from svo.checks import Array, expect, expect_kind, expect_shape, is_count
 from svo.isolation.containment import excludes
 from svo.isolation.logic import NOMINAL
+from svo.logs.log import Log
+from svo.models import UncertainModel
 from svo.observers.base import Observer
 
 _AN_OBSERVER = (
@@ -63,3 +65,14 @@ def check_observers(observers: Mapping[str, Observer], same_states: bool) -> Non
             found, wanted = getattr(observer.model, attribute), getattr(nominal, attribute)
             if found != wanted:
                 raise ValueError(f"the model of {name!r} has {attribute} = {found}; expected {wanted}, as nominal has")
+
+
+def check_log(log: Log, model: UncertainModel, start: int, started: bool) -> None:
+    """Refuse a log of other channels than the models', or samples ``start`` of it at which a bank does not stand."""
+    if start == 0 and started:
+        raise ValueError("run was called on a bank that has already started; call reset(set), or use a fresh bank")
+    if start > 0 and not started:
+        raise ValueError(f"start is {start}, but the bank has seen no sample; expected 0")
+    for name, wanted in (("u", model.n_inputs), ("y", model.n_outputs)):
+        array: Array = getattr(log, name)
+        expect_shape(array.shape[1] == wanted, f"log.{name}", array, f"(samples, {wanted}), as the models have")
