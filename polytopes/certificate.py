@@ -96,7 +96,7 @@ class Certificate(Shown):
 def _parse(data: Mapping[str, Any], part: str) -> Multipliers:
     try:
         entries = data[part].items()
-    except (KeyError, AttributeError, TypeError):
+    except (LookupError, AttributeError, TypeError):
         raise ValueError(f"certificate has no table {part!r} of multipliers; expected what to_dict writes.") from None
     multipliers: Multipliers = {}
     for row, text in entries:

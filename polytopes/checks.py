@@ -10,7 +10,7 @@ import math
 import operator
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, TypeVar
 
 import numpy as np
@@ -102,6 +102,8 @@ def whole_number(name: str, value: Any, *, least: int | None = None) -> int:
 def different_coordinates(name: str, value: Any, dim: int) -> list[int]:
     """One or more different integers from 0 up to dim - 1, in their order."""
     try:
+        if isinstance(value, str | bytes | Mapping | Set):
+            raise TypeError
         found = [whole_number(name, j) for j in value]
     except TypeError:
         raise TypeError(f"{name} is {value!r}; expected a sequence of integers below {dim}.") from None

@@ -100,7 +100,7 @@ class Constructions(Shape):
         """
         if not isinstance(fixed, Mapping):
             raise TypeError(f"fixed is a {type(fixed).__name__}; expected a mapping: {{0: 0.5}} fixes coordinate 0.")
-        coordinates = different_coordinates("fixed", fixed, self.dim) if fixed else []
+        coordinates = different_coordinates("fixed", list(fixed), self.dim) if fixed else []
         if len(coordinates) == self.dim:
             raise ValueError(f"fixed has all {self.dim} coordinates; expected one or more to stay free. Use `x in P`.")
         values = {j: real_number(f"fixed[{j}]", fixed[j]) for j in coordinates}

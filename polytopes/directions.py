@@ -11,14 +11,14 @@ from polytopes.checks import Floats, real_array, whole_number
 def box_directions(n: int) -> Floats:
     """The axes and their opposites (2 n, n): the normals of boxes."""
     axes = np.eye(whole_number("n", n, least=1))
-    return np.vstack([axes, -axes])
+    return np.vstack([axes, 0.0 - axes])
 
 
 def octagon_directions(n: int) -> Floats:
     """Those of boxes and all ``+-e_i +- e_j`` (2 n^2, n): the normals of octagons (Mine 2006)."""
     axes = np.eye(whole_number("n", n, least=1))
     signs = list(itertools.product((1.0, -1.0), repeat=2))
-    pairs = [s * axes[i] + t * axes[j] for i, j in itertools.combinations(range(n), 2) for s, t in signs]
+    pairs = [0.0 + s * axes[i] + t * axes[j] for i, j in itertools.combinations(range(n), 2) for s, t in signs]
     return np.vstack([box_directions(n), *pairs])
 
 
@@ -74,4 +74,4 @@ def eigenvector_directions(M: ArrayLike) -> Floats:
     values, vectors = np.linalg.eig(matrix.T)
     kept = vectors[:, values.imag >= 0.0].T
     rows = np.vstack([kept.real, kept.imag[np.abs(kept.imag).max(axis=1) > 0.0]])
-    return np.vstack([rows, -rows])
+    return np.vstack([rows, 0.0 - rows])

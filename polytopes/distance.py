@@ -20,7 +20,7 @@ from polytopes.outer_supports import exact_maximum_of
 from polytopes.product import product
 from polytopes.rows import Rows
 from polytopes.separation import intersects
-from polytopes.support import is_bounded, known_nonempty, maxima
+from polytopes.support import is_bounded, known_nonempty, maxima, support
 
 _EPS = float(np.finfo(np.float64).eps)
 NORMS = (1, 2, inf)
@@ -114,10 +114,12 @@ def _farthest(P: Rows, Q: Rows, norm: float) -> float:
     if broken_row(Q, P) is None:
         return 0.0
     corners = generators(P).vertices
-    if norm == 2:  # floats tell which one is the farthest
+    if norm == 2:
         missed = [nearest(Q, np.eye(Q.dim), x, exactly=False).point - x for x in corners]
-        corners = corners[[int(np.argmax(np.linalg.norm(missed, axis=1)))]]
-    return max(float(distance_to_point(Q, x, norm)) for x in corners)
+        values = np.linalg.norm(missed, axis=1)
+    else:
+        values = np.array([-float(support(*_program(Q, np.eye(Q.dim), x, norm))) for x in corners])
+    return float(distance_to_point(Q, corners[int(values.argmax())], norm))  # floats tell which one is the farthest
 
 
 def _has_directions(P: Rows, Q: Rows) -> bool:
@@ -159,16 +161,8 @@ def _root(squared: Fraction) -> tuple[float, float, float]:
 
 
 def _by_program(P: Rows, F: Floats, g: Floats, norm: float, ends: Ends) -> Distance:
-    """The least ``|F y - g|`` over P by a linear program in y and one bound t, or one for each entry of ``F y - g``."""
-    k, more = len(g), 1 if norm == inf else len(g)
-    sides = np.ones((k, 1)) if norm == inf else np.eye(k)
-    lifted = Rows(
-        np.vstack([np.hstack([P.A, np.zeros((P.b.size, more))]), np.hstack([F, -sides]), np.hstack([-F, -sides])]),
-        np.concatenate([P.b, g, -g]),
-        np.hstack([P.C, np.zeros((P.d.size, more))]),
-        P.d,
-    )
-    least = np.append(np.zeros(P.dim), -np.ones(more))
+    """The least ``|F y - g|`` over P by a linear program."""
+    lifted, least = _program(P, F, g, norm)
     best = maxima(lifted, least[None])
     assert best is not None
     y = best.points[0, : P.dim]
@@ -178,3 +172,16 @@ def _by_program(P: Rows, F: Floats, g: Floats, norm: float, ends: Ends) -> Dista
         return Distance(float(-exact), -up(exact), up(-exact), point, other)
     value, lower = float(np.linalg.norm(F @ y - g, norm)), max(0.0, -float(best.values[0]))
     return Distance(value, min(lower, value), value * (1.0 + 1e-12), point, other)
+
+
+def _program(P: Rows, F: Floats, g: Floats, norm: float) -> tuple[Rows, Floats]:
+    """Rows in y and one bound t, or one for each entry of ``F y - g``, and the form whose maximum is the distance's."""
+    k, more = len(g), 1 if norm == inf else len(g)
+    sides = np.ones((k, 1)) if norm == inf else np.eye(k)
+    lifted = Rows(
+        np.vstack([np.hstack([P.A, np.zeros((P.b.size, more))]), np.hstack([F, -sides]), np.hstack([-F, -sides])]),
+        np.concatenate([P.b, g, -g]),
+        np.hstack([P.C, np.zeros((P.d.size, more))]),
+        P.d,
+    )
+    return lifted, np.append(np.zeros(P.dim), -np.ones(more))

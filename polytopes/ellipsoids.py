@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from math import gamma, pi
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from polytopes.affine_hull import explicit
-from polytopes.checks import Floats
+from polytopes.checks import Floats, real_array
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
 from polytopes.frame import unit_body
 from polytopes.lengths import evened, lengths
@@ -46,14 +47,19 @@ class Ellipsoid(Shown):
         d = self.axes.shape[1]
         return float(pi ** (d / 2) / gamma(d / 2 + 1) * np.prod(np.linalg.svd(self.axes, compute_uv=False)))
 
-    def support(self, directions: Floats) -> Floats:
-        """``c'x + |axes'c|`` along directions (k, n): array (k,)."""
-        rows = np.atleast_2d(directions)
+    def support(self, directions: ArrayLike) -> Floats:
+        """``c'x + |axes'c|`` along directions (k, n), or (n,): array (k,)."""
+        n = self.centre.size
+        rows = np.atleast_2d(real_array("directions", directions, (n,), ("k", n)))
         return np.asarray(rows @ self.centre + np.linalg.norm(rows @ self.axes, axis=1))
 
-    def surface(self, directions: Floats) -> Floats:
-        """The points ``centre + axes u / |u|`` for directions u (k, d): array (k, n)."""
-        return np.asarray(self.centre + directions / np.linalg.norm(directions, axis=1)[:, None] @ self.axes.T)
+    def surface(self, directions: ArrayLike) -> Floats:
+        """The points ``centre + axes u / |u|`` for directions u (k, d), none zero: array (k, n)."""
+        rows = real_array("directions", directions, ("k", self.axes.shape[1]))
+        sizes = lengths(rows)[:, None]
+        if rows.shape[1] and not sizes.all():
+            raise ValueError(f"directions has a zero row, {int(sizes.argmin())}; expected directions.")
+        return np.asarray(self.centre + rows / sizes @ self.axes.T)
 
 
 def inscribed_ellipsoid(P: Rows) -> Ellipsoid:

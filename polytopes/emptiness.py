@@ -40,6 +40,12 @@ class Emptiness(Shown):
     certificate: Certificate | None
     reason: str
 
+    def __post_init__(self) -> None:
+        if self.witness is not None:  # the set keeps this answer, and may go on from that point
+            witness = self.witness.copy()
+            witness.setflags(write=False)
+            object.__setattr__(self, "witness", witness)
+
 
 @dataclass(frozen=True, eq=False)
 class _Face:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from polytopes.checks import Floats, whole_number
+from polytopes.fractions_given import number_of_text
 from polytopes.rows import Rows, Table
 
 _PARTS = ("A", "b", "C", "d")
@@ -51,7 +52,7 @@ def _numbers(where: str, entry: Any) -> Floats | float:
 
 def _number(where: str, entry: Any) -> float:
     try:
-        exact = Fraction(entry)
+        exact = number_of_text(entry) if isinstance(entry, str) else Fraction(entry)
         value = float(exact)
     except (ValueError, TypeError, ZeroDivisionError, OverflowError):
         raise ValueError(f"{where} holds {entry!r}; expected a number or 'numerator/denominator'.") from None

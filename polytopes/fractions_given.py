@@ -3,6 +3,7 @@
 A row may be multiplied by a positive number, so that ``[1/3, 1] x <= 1/7`` is a row of floats, ``[7, 21] x <= 3``.
 """
 
+import sys
 from collections.abc import Sequence
 from fractions import Fraction
 from math import gcd, lcm
@@ -12,7 +13,10 @@ import numpy as np
 
 from polytopes.checks import Floats
 from polytopes.double_description import Integers
-from polytopes.integers import are_floats, as_floats
+from polytopes.integers import are_floats, as_floats, trailing_zeros
+
+_LARGEST = 1024  # bits of the largest float
+_MOST_DIGITS = 5000  # of the exponent of ten of a decimal; 10 to a long one takes for ever
 
 
 def hold_fractions(*parts: Any) -> bool:
@@ -78,9 +82,37 @@ def rows_of_floats(names: str, A: Any, b: Any) -> tuple[Floats, Floats]:
 def row_of_floats(what: str, row: Sequence[Fraction]) -> Floats:
     """A row times a positive number that makes floats of it; ValueError if there is none."""
     whole = primitive_row(row)
-    if not are_floats(whole):
+    if are_floats(whole):
+        return as_floats(whole, whole)
+    longest, shortest = max(map(abs, whole)).bit_length(), min(trailing_zeros(v) for v in whole if v)
+    middle = max((longest + shortest) // 2, longest - _LARGEST)  # the least entries may be subnormal
+    scaled = [v / Fraction(2) ** middle for v in whole]
+    if max(abs(v) for v in scaled) > sys.float_info.max or any(Fraction(float(v)) != v for v in scaled):
         raise ValueError(f"{what} is no multiple of floats; round it first.")
-    return as_floats(whole, whole)
+    return np.array([float(v) for v in scaled])
+
+
+def nearest_row(what: str, row: Sequence[Fraction]) -> Floats:
+    """The same, or else the nearest floats; ValueError if one is beyond all floats, or becomes zero."""
+    try:
+        return row_of_floats(what, row)
+    except ValueError:
+        pass
+    try:
+        made = np.array([float(v) for v in row])
+    except OverflowError:
+        made = np.zeros(len(row))
+    if any(u and not v for u, v in zip(row, made.tolist(), strict=True)):
+        raise ValueError(f"{what} has a number beyond all floats.")
+    return made
+
+
+def number_of_text(text: str) -> Fraction:
+    """An integer, a fraction or a decimal as it stands; ValueError for one with an exponent that no float has."""
+    _, _, exponent = text.lower().partition("e")
+    if exponent and abs(int(exponent)) > _MOST_DIGITS:
+        raise ValueError(f"{text!r} is beyond all floats")
+    return Fraction(text)
 
 
 def primitive_row(row: Sequence[Fraction]) -> list[int]:

@@ -71,7 +71,7 @@ class HPolytope(Shown, Operators):
             raise ValueError("lower is +inf or upper is -inf somewhere; expected -inf, +inf or a finite bound.")
         axes = np.eye(low.size)
         above, below = np.isfinite(high), np.isfinite(low)
-        box = cls(np.vstack([axes[above], -axes[below]]), np.concatenate([high[above], -low[below]]))
+        box = cls(np.vstack([axes[above], 0.0 - axes[below]]), np.concatenate([high[above], 0.0 - low[below]]))
         _ = box.as_box  # at once: no question to it then has to look at its rows
         return keeping(box, partial(of_box, low, high))
 
@@ -120,7 +120,7 @@ class HPolytope(Shown, Operators):
     def simplex(cls, n: int) -> Self:
         """``{x >= 0, x_1 + ... + x_n <= 1}`` in n dimensions."""
         n = whole_number("n", n, least=1)
-        simplex = cls(np.vstack([-np.eye(n), np.ones((1, n))]), np.append(np.zeros(n), 1.0))
+        simplex = cls(np.vstack([0.0 - np.eye(n), np.ones((1, n))]), np.append(np.zeros(n), 1.0))
         return keeping(simplex, lambda: of_points(np.vstack([np.zeros(n), np.eye(n)])))
 
     @classmethod

@@ -86,10 +86,11 @@ def rounded_difference(first: Floats, second: Floats, difference: Floats) -> Flo
 
 def are_floats(row: Sequence[int]) -> bool:
     """Whether each integer is a float, up to one power of two for all of them."""
-    return all(v == 0 or abs(v).bit_length() - _trailing(v) <= 53 for v in row) and _span(row) < _FARTHEST
+    return all(v == 0 or abs(v).bit_length() - trailing_zeros(v) <= 53 for v in row) and _span(row) < _FARTHEST
 
 
-def _trailing(v: int) -> int:
+def trailing_zeros(v: int) -> int:
+    """Exponent of the lowest bit of an integer that is not zero."""
     return (v & -v).bit_length() - 1
 
 

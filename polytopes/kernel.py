@@ -44,9 +44,7 @@ _cone_rays = function(
     "fdi_cone_rays", *[Integer] * 2, *[Given] * 2, *[Integer] * 2, *[Entries] * 3, Address, returns=Integer
 )
 _cone_rays_room = _room("cone_rays", 3)
-_pointed_cone = function(
-    "fdi_pointed_cone", *[Integer] * 2, Given, *[Integer] * 2, Entries, Address, returns=Integer
-)
+_pointed_cone = function("fdi_pointed_cone", *[Integer] * 2, Given, *[Integer] * 2, Entries, Address, returns=Integer)
 _pointed_cone_room = _room("pointed_cone", 3)
 _integer_rows = function("fdi_integer_rows", *[Integer] * 2, Given, Entries, returns=Integer)
 _exponents = function("fdi_exponents", *[Integer] * 2, *[Given] * 2, *[Entries] * 2, Address)

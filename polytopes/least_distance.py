@@ -42,17 +42,17 @@ def nearest(P: Rows, F: Floats, g: Floats, exactly: bool = True) -> Nearest:
 
 
 def _by_active_set(P: Rows, F: Floats, g: Floats, y: Floats) -> tuple[Floats, list[int]]:
-    rows = np.flatnonzero(P.A.any(axis=1))
-    A, b = evened(P.A[rows], P.b[rows])
-    A, b = A / lengths(A)[:, None], b / lengths(A)
+    rows, fixed = np.flatnonzero(P.A.any(axis=1)), P.C.any(axis=1)
+    A, b = _of_length_one(P.A[rows], P.b[rows])
+    C, _ = _of_length_one(P.C[fixed], P.d[fixed])
     held: list[int] = []
     last = np.inf
     for _ in range(_STEPS * (len(A) + P.dim)):
         size = float(np.abs(y).max()) + float(np.abs(g).max(initial=0.0)) + float(np.abs(b).max(initial=0.0))
         missed = g - F @ y
-        step = _step(np.vstack([P.C, A[held]]), F, missed)
+        step = _step(np.vstack([C, A[held]]), F, missed)
         if np.abs(F @ step).max() <= _STILL * size:
-            loose = _release(P.C, A[held], F.T @ missed, float(np.linalg.norm(missed)) >= last)
+            loose = _release(C, A[held], F.T @ missed, float(np.linalg.norm(missed)) >= last)
             if loose is None:
                 break
             last = min(last, float(np.linalg.norm(missed)))
@@ -69,6 +69,13 @@ def _by_active_set(P: Rows, F: Floats, g: Floats, y: Floats) -> tuple[Floats, li
         else:
             y = y + step
     return y, [int(rows[i]) for i in held]
+
+
+def _of_length_one(rows: Floats, sides: Floats) -> tuple[Floats, Floats]:
+    """Rows and their sides over the lengths of the rows: a rank is then none of their units."""
+    even, values = evened(rows, sides)
+    sizes = lengths(even)
+    return even / sizes[:, None], values / sizes
 
 
 def _step(rows: Floats, F: Floats, missed: Floats) -> Floats:

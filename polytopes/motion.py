@@ -22,6 +22,6 @@ def scaled(P: Rows, s: float) -> Table:
     if s == 0.0:
         origin = np.empty((0, P.dim)), np.empty(0), np.eye(P.dim), np.zeros(P.dim)
         return origin if known_nonempty(P) else nothing(P.dim)
-    A, factor = P.A if s > 0.0 else -P.A, Fraction(s)
+    A, factor = P.A if s > 0.0 else 0.0 - P.A, Fraction(s)
     sides = [abs(factor) * Fraction(v) for v in P.b.tolist()]
     return with_sides(A, sides, P.C, [factor * Fraction(v) for v in P.d.tolist()])

@@ -41,12 +41,12 @@ class Operators(Constructions):
         return self.affine_map(M)
 
     def __matmul__(self, M: ArrayLike) -> Self:
-        raise TypeError(
-            "P @ M is not defined: M @ P is an image, P.preimage(M) what M takes into the set."
-        )
+        raise TypeError("P @ M is not defined: M @ P is an image, P.preimage(M) what M takes into the set.")
 
     def __neg__(self) -> Self:
-        return moved(self, type(self)(-self.A, self.b, -self.C, self.d), -np.eye(self.dim), np.zeros(self.dim))
+        return moved(
+            self, type(self)(0.0 - self.A, self.b, 0.0 - self.C, self.d), -np.eye(self.dim), np.zeros(self.dim)
+        )
 
     def __mul__(self, s: float) -> Self:
         return NotImplemented if isinstance(s, Rows) else self.scale(s)

@@ -70,10 +70,7 @@ def plot(P: Rows, ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list
     An unbounded set is cut at a box around what the axes show (or around its largest ball), a flat one is a face, a
     line or a point, and the empty set draws nothing.
     """
-    if ax is None:
-        import matplotlib.pyplot as plt  # imported here: not every user draws
-
-        ax = plt.figure().add_subplot(projection="3d" if len(dims) == 3 else None)
+    ax = _axes(ax, len(dims))
     if not known_nonempty(P):
         return []
     body = _cut(P, ax, dims)
@@ -83,14 +80,27 @@ def plot(P: Rows, ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list
     return _draw_faces(ax, Rows(*project(body, dims, "auto", _MAX_ROWS, False)), {"alpha": 0.4, **edge, **style})
 
 
+def _axes(ax: Any, d: int) -> Any:
+    """Axes of two or three dimensions, new ones if none are given."""
+    if ax is None:
+        import matplotlib.pyplot as plt  # imported here: not every user draws
+
+        return plt.figure().add_subplot(projection="3d" if d == 3 else None)
+    if not hasattr(ax, "add_patch"):
+        raise TypeError(f"ax is a {type(ax).__name__}; expected axes of matplotlib.")
+    if hasattr(ax, "get_zlim") != (d == 3):
+        raise ValueError(f"ax has {2 if d == 3 else 3} dimensions; expected {d}, as many as dims has coordinates.")
+    return ax
+
+
 def plot_all(sets: Sequence[Rows], ax: Any, dims: tuple[int, ...], style: dict[str, Any]) -> list[Any]:
     """Draw the shadows of some sets on the same axes, in one colour; returns the artists."""
     drawn: list[Any] = []
+    ax = _axes(ax, len(dims))
     shared = style if "color" in style else {"facecolor": "C0", **style}
     for P in sets:
         drawn += plot(P, ax, dims, shared)
         if drawn:
-            ax = drawn[-1].axes
             shared = {key: value for key, value in shared.items() if key != "label"}  # one entry of a legend
     return drawn
 

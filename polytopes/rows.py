@@ -240,10 +240,10 @@ def everything(n: int) -> Table:
     return np.empty((0, n)), np.empty(0), np.empty((0, n)), np.empty(0)
 
 
-def a_set(Q: Rows) -> Rows:
-    """Q itself, if it is a set; TypeError otherwise."""
+def a_set(Q: Rows, name: str = "Q") -> Rows:
+    """Q itself, if it is a set; TypeError with its name otherwise."""
     if not isinstance(Q, Rows):
-        raise TypeError(f"Q is a {type(Q).__name__}; expected an HPolytope.")
+        raise TypeError(f"{name} is a {type(Q).__name__}; expected an HPolytope.")
     return Q
 
 

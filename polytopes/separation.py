@@ -16,7 +16,7 @@ from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.exact import Multipliers, combine
 from polytopes.intersection import rows_of_both
-from polytopes.rows import Rows
+from polytopes.rows import Rows, a_set, same_space
 from polytopes.shown import Shown
 
 _EXACT = 2**53  # integers up to here are floats
@@ -76,7 +76,8 @@ class Intersects(Answer):
 
     def verify(self, P: Rows, Q: Rows) -> bool:
         """Whether multipliers prove, in rationals, that P and Q have no common point, and the plane is theirs."""
-        if self.certificate is None or not self.certificate.verify(Rows(*rows_of_both(P, Q))):
+        both = Rows(*rows_of_both(a_set(P, "P"), same_space(P, Q)))
+        if self.certificate is None or not self.certificate.verify(both):
             return False
         return self.plane == _plane(P, Q, self.certificate)
 

@@ -31,7 +31,7 @@ def difference(P: Piece, Q: Rows) -> list[Piece]:
     pieces, rest = [], P
     for normal, side in zip(*strictest(*half_spaces(Q)), strict=True):
         if broken_row(Rows(normal[None], [side]), rest) is not None:
-            pieces.append(_with_row(rest, -normal, -side))
+            pieces.append(_with_row(rest, 0.0 - normal, 0.0 - side))
             rest = _with_row(rest, normal, side)
     return pieces
 

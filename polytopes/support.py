@@ -140,7 +140,7 @@ def bounding_box(P: Rows) -> tuple[Floats, Floats]:
     values = supports(P, both_ways(P.dim))
     if values[0] == -np.inf:
         raise EmptySetError("the empty set has no bounding box; ask emptiness() first.")
-    return -values[P.dim :], values[: P.dim]
+    return 0.0 - values[P.dim :], values[: P.dim] + 0.0  # no negative zeros
 
 
 def is_bounded(P: Rows) -> bool:

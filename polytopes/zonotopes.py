@@ -6,16 +6,19 @@ sigma a lower bound of ``h'x`` over it, the row ``h'x <= k`` is the constraint
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from polytopes.affine_image import affine_image
 from polytopes.checks import Floats, real_array
 from polytopes.errors import EmptySetError, UnboundedError
+from polytopes.inclusion import strictest
+from polytopes.integers import up
 from polytopes.outer_supports import upper_supports
-from polytopes.rows import Rows, Table
+from polytopes.rows import Rows, Table, a_set, nothing
 from polytopes.shown import Shown
 from polytopes.support import bounding_box, is_bounded, known_nonempty
 from polytopes.value import Value
@@ -69,7 +72,7 @@ class ConstrainedZonotope(Shown, Value):
         EmptySetError, UnboundedError
             If P is empty or unbounded.
         """
-        if not known_nonempty(P):
+        if not known_nonempty(a_set(P, "P")):
             raise EmptySetError("the empty set is no constrained zonotope around a point; ask is_empty() first.")
         if not is_bounded(P):
             raise UnboundedError("P is unbounded, and zonotopes are not; intersect it with a box first.")
@@ -96,9 +99,38 @@ class ConstrainedZonotope(Shown, Value):
 
 def rows_of_zonotope(Z: ConstrainedZonotope) -> Table:
     """Rows of the image of ``{|xi| <= 1, A xi = b}`` under ``c + G xi``; exact or outward, as images are."""
-    g = Z.generators.shape[1]
-    if not g:
-        return np.empty((0, Z.dim)), np.empty(0), np.eye(Z.dim), Z.centre
-    axes = np.eye(g)
-    cube = Rows(np.vstack([axes, -axes]), np.ones(2 * g), Z.constraints, Z.offset)
-    return affine_image(cube, Z.generators, Z.centre)
+    if not Z.generators.any():
+        fixed = np.empty((0, Z.dim)), np.empty(0), np.eye(Z.dim), Z.centre
+        return fixed if _has_point(Z) else nothing(Z.dim)
+    kept, A, b, C, d = _without_slacks(Z)
+    axes = np.eye(len(kept))
+    cube = Rows(np.vstack([axes, -axes, A]), np.append(np.ones(2 * len(kept)), b), C, d)
+    return affine_image(cube, Z.generators[:, kept], Z.centre)
+
+
+def _has_point(Z: ConstrainedZonotope) -> bool:
+    """Whether some ``|xi| <= 1`` keeps the constraints."""
+    axes = np.eye(Z.generators.shape[1])
+    if not axes.size:
+        return not Z.offset.any()
+    return known_nonempty(Rows(np.vstack([axes, -axes]), np.ones(2 * len(axes)), Z.constraints, Z.offset))
+
+
+def _without_slacks(Z: ConstrainedZonotope) -> tuple[NDArray[np.int64], Floats, Floats, Floats, Floats]:
+    """The generators that count, and ``{|xi| <= 1, A xi = b}`` as rows on these, repeated ones once, and equalities.
+
+    A generator of zeros that one constraint has, ``a'xi + w eta = b``, only says that ``b - |w| <= a'xi <= b + |w|``.
+    """
+    used = np.count_nonzero(Z.constraints, axis=0)
+    slack = np.flatnonzero(~Z.generators.any(axis=0) & (used <= 1))
+    of_row = {int(np.flatnonzero(Z.constraints[:, j])[0]): int(j) for j in slack if used[j]}  # one a row: the last
+    dropped = [int(j) for j in slack if not used[j]] + list(of_row.values())
+    kept = np.setdiff1d(np.arange(Z.generators.shape[1]), dropped)
+    loose = sorted(of_row)
+    rest = np.setdiff1d(np.arange(len(Z.offset)), loose)
+    rows, widths = Z.constraints[np.ix_(loose, kept)], [abs(Fraction(Z.constraints[i, of_row[i]])) for i in loose]
+    sides = [Fraction(v) for v in Z.offset[loose].tolist()]
+    above = [up(v + w) for v, w in zip(sides, widths, strict=True)]
+    below = [up(w - v) for v, w in zip(sides, widths, strict=True)]
+    A, b = strictest(np.vstack([rows, -rows]) + 0.0, np.array(above + below))
+    return kept, A, b, Z.constraints[np.ix_(rest, kept)], Z.offset[rest]

@@ -185,3 +185,25 @@ def test_wrong_distances_are_refused() -> None:
         P.distance(HPolytope.box([0.0], [1.0]))
     with pytest.raises(TypeError, match="norm="):
         P.distance([0.0, 0.0], 1)  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("unit", [2.0**-600, 2.0**40])
+def test_units_of_equalities_change_no_distance(unit: float) -> None:
+    """A search that told ranks from rows as long as they were given stopped at another vertex."""
+    rng = np.random.default_rng(8)
+    for _ in range(2):
+        P = HPolytope.from_vertices(rng.integers(-4, 5, (6, 3)))
+        edge = HPolytope.from_vertices(rng.integers(-4, 5, (2, 3)))
+        Q = HPolytope(edge.A, edge.b, edge.C * [[1.0], [unit]], edge.d * [1.0, unit])
+        for norm in NORMS:
+            assert P.hausdorff(Q, norm=norm) == pytest.approx(P.hausdorff(edge, norm=norm), rel=1e-14)
+        x = rng.standard_normal(3)
+        missed = nearest(Q, np.eye(3), x, exactly=False).point - edge.closest_point(x)
+        assert np.abs(missed).max() < 1e-12
+
+
+@pytest.mark.parametrize("n", [6, pytest.param(8, marks=pytest.mark.slow)])
+def test_hausdorff_distances_of_many_vertices(n: int) -> None:
+    cube, cross = HPolytope.box([-1.0] * n, [1.0] * n), HPolytope.cross_polytope(n)
+    for norm, value in ((1, n - 1), (2, (n - 1) / n**0.5), (np.inf, (n - 1) / n)):
+        assert cube.hausdorff(cross, norm=norm) == pytest.approx(value, rel=1e-14)

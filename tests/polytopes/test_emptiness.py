@@ -215,3 +215,12 @@ def test_a_set_that_touches_in_one_point_after_another_is_decided_on_its_faces()
     certificate = Q.emptiness().certificate
     assert certificate is not None
     assert certificate.verify(Q)
+
+
+@pytest.mark.parametrize("P", [HPolytope.box([0], [1]), HPolytope([[1.0, 0.3]], [1.0]), HPolytope.cross_polytope(3)])
+def test_a_witness_cannot_be_written(P: HPolytope) -> None:
+    """The set keeps it, and its next answer would be about another point."""
+    for point in (P.emptiness().witness, P.intersects(P).point):
+        with pytest.raises(ValueError, match="read-only"):
+            point[:] = 77.0
+    assert P.emptiness().witness in P

@@ -1,7 +1,11 @@
 """Files, dicts and constraints: what goes out comes back exactly, and other libraries understand it."""
 
+import importlib.util
 import json
+import sys
+from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +15,7 @@ from sets import CATALOGUE, EMPTY, UNBOUNDED
 
 from polytopes import HPolytope, UnboundedError, conversions
 from polytopes.files import read_ext, read_ine, write_ext, write_ine
+from polytopes.planar import is_convex_ring, outline
 
 EVERY = pytest.mark.parametrize("name", CATALOGUE)
 
@@ -69,6 +74,13 @@ def test_a_file_of_another_hand(tmp_path: Path) -> None:
         ("begin\n1 2 rational\n1 1/0\nend", "no file of cddlib"),
         ("V-representation\nbegin\n1 2 integer\n1 1\nend", "is a V-representation; expected a H-representation"),
         (f"begin\n1 2 integer\n1 {3**40}\nend", "row 1 is no multiple of floats"),
+        ("begin\n1 2 real\n1 1e-400\nend", "row 1 has a number beyond all floats"),
+        ("begin\n1 2 real\n1 1e999999999999\nend", "is beyond all floats"),
+        ("begin\n1 2 integer\n1 1 5\nend", "more than 1 rows of 2 numbers"),
+        ("begin\n1 2 integer\n1 1\n1 5\nend", "more than 1 rows of 2 numbers"),
+        ("begin\n-1 2 integer\nend", "it says -1 rows of 2 numbers"),
+        ("linearity 1 2\nbegin\n1 2 integer\n1 1\nend", "linearity names row 2 of 1"),
+        ("linearity 2 1\nbegin\n1 2 integer\n1 1\nend", "linearity names 1 rows, and says 2"),
     ],
 )
 def test_wrong_files_are_refused(text: str, message: str, tmp_path: Path) -> None:
@@ -76,6 +88,51 @@ def test_wrong_files_are_refused(text: str, message: str, tmp_path: Path) -> Non
     path.write_text(text)
     with pytest.raises(ValueError, match=message):
         read_ine(path)
+
+
+EXTREME = [
+    HPolytope([[1.0, 0.0], [0.0, -1e-300]], [1e-300, 0.1]),
+    HPolytope([[1.0, 1e-300], [2.0**-1074, 3.0]], [1e300, 2.0**1023], [[1e308, -(2.0**-1022)]], [5e-324]),
+    HPolytope([[1e-200, 1e150]], [0.3]),
+]
+
+
+@pytest.mark.parametrize("P", EXTREME)
+def test_the_longest_numbers_come_back(P: HPolytope, tmp_path: Path) -> None:
+    path = tmp_path / "set.ine"
+    write_ine(P, path)
+    again = read_ine(path)
+    for rows, sides, given, values in ((again.A, again.b, P.A, P.b), (again.C, again.d, P.C, P.d)):
+        for row, whole in zip(np.column_stack([rows, sides]), np.column_stack([given, values]), strict=True):
+            factors = {Fraction(u) / Fraction(v) for u, v in zip(row.tolist(), whole.tolist(), strict=True) if v}
+            assert len(factors) == 1
+            assert factors.pop() > 0
+            assert ((row == 0.0) == (whole == 0.0)).all()
+    others = [HPolytope.from_dict(P.to_dict())]
+    if "cdd" in sys.modules or importlib.util.find_spec("cdd"):
+        others.append(conversions.from_cdd(conversions.to_cdd(P)))
+    for other in others:
+        for part, given in zip(other.table, P.table, strict=True):
+            np.testing.assert_array_equal(part, given)
+
+
+def test_real_numbers_of_a_file_are_the_nearest_floats_where_they_are_no_others(tmp_path: Path) -> None:
+    path, A = tmp_path / "set.ine", np.random.default_rng(1).standard_normal((5, 3))
+    rows = "\n".join(" ".join(f"{v:.16e}" for v in [1.0, *(-row)]) for row in A)
+    path.write_text(f"* données\nbegin\n5 4 real\n{rows}\nend\n", "latin-1")
+    np.testing.assert_array_equal(read_ine(path).A, A)
+    path.write_text("begin\n1 2 real\n1 -0.1\nend")
+    assert read_ine(path) == HPolytope([[1.0]], [10.0])
+
+
+def test_matrices_of_fractions_are_exact() -> None:
+    cdd = pytest.importorskip("cdd")
+    matrix = SimpleNamespace(
+        rep_type=cdd.RepType.INEQUALITY, array=[[Fraction(1, 3), -1], [Fraction(1, 7), 2]], lin_set={1}
+    )
+    P = conversions.from_cdd(matrix)
+    np.testing.assert_array_equal(P.A, [[3.0]])
+    np.testing.assert_array_equal(P.C, [[-14.0]])
 
 
 def test_wrong_generators_are_refused(tmp_path: Path) -> None:
@@ -140,6 +197,15 @@ def test_shapely(name: str) -> None:
     assert conversions.from_shapely(geometry).equals(P)
 
 
+def test_shapely_of_very_uneven_sets() -> None:
+    shapely = pytest.importorskip("shapely")
+    for P in (HPolytope.box([0.0, 0.0], [1e-140, 1e140]), HPolytope.box([1.0, 0.0], [1.0 + 2.0**-52, 1e-120])):
+        assert conversions.from_shapely(conversions.to_shapely(P)) == P
+    ring = shapely.Polygon([(0, 0), (4, 0), (4, 4), (0, 4)], [[(1, 1), (2, 1), (1, 2)]])
+    with pytest.raises(ValueError, match="not convex"):
+        conversions.from_shapely(ring)
+
+
 def test_what_shapely_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "shapely", None)
     with pytest.raises(ImportError, match="pip install shapely"):
@@ -151,3 +217,21 @@ def test_what_shapely_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     corner = shapely.Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
     with pytest.raises(ValueError, match="not convex"):
         conversions.from_shapely(corner)
+
+
+def test_outlines_and_convex_rings_are_decided_in_rationals() -> None:
+    thin = np.array([[0.0, 0.0], [1e100, 1e-200], [2e100, 2e-200], [2e100, 5e-200], [0.0, 1e-320]])
+    np.testing.assert_array_equal(outline(thin[::-1]), thin[[0, 2, 3, 4]])
+    np.testing.assert_array_equal(outline(np.array([[2.0, 2.0], [1.0, 1.0], [3.0, 3.0]])), [[1.0, 1.0], [3.0, 3.0]])
+    np.testing.assert_array_equal(outline(np.array([[2.0, 2.0]] * 3)), [[2.0, 2.0]])
+    assert outline(np.empty((0, 2))).size == 0
+    ring = thin[[0, 0, 1, 2, 3, 4, 0]]
+    for some in (ring, ring[::-1], np.roll(ring[1:-1], 2, axis=0)[[0, 1, 2, 3, 4, 0]]):
+        assert is_convex_ring(some)
+    dented = thin[[0, 1, 2, 3, 4, 0]].copy()
+    dented[1, 1] = np.nextafter(dented[1, 1], 1.0)  # the second corner a little inside
+    assert not is_convex_ring(dented)
+    star = np.array([[np.cos(t), np.sin(t)] for t in 0.8 * np.pi * np.arange(6)])
+    star[-1] = star[0]
+    assert not is_convex_ring(star)  # turns left everywhere, and twice around
+    assert not is_convex_ring(np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]]))  # there and back

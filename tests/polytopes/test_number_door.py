@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 import scipy.sparse
 
-from polytopes import HPolytope, convex_hull, union_bounds
+from polytopes import Certificate, ConstrainedZonotope, HPolytope, conversions, convex_hull, union_bounds
 from polytopes.checks import real_array, real_number, whole_number
+from polytopes.files import write_ext, write_ine
 
 
 class WithUnit(np.ndarray):
@@ -131,6 +132,7 @@ def test_shapes_and_single_numbers() -> None:
 
 MASKED = np.ma.array(np.eye(2), mask=[[False, True], [False, False]])
 BOX = HPolytope.box([0.0, 0.0], [1.0, 1.0])
+BALL = BOX.enclosing_ellipsoid()
 
 
 @pytest.mark.parametrize(
@@ -153,6 +155,8 @@ BOX = HPolytope.box([0.0, 0.0], [1.0, 1.0])
         lambda value: BOX.preimage(np.eye(2), value[0]),
         lambda value: BOX.outer_template(value),
         lambda value: union_bounds([BOX], directions=value),
+        lambda value: BALL.support(value),
+        lambda value: BALL.surface(value),
     ],
 )
 @pytest.mark.parametrize("value", [MASKED, np.eye(2) + 0j, np.eye(2).astype(str), np.eye(2).astype("m8[s]")])
@@ -177,6 +181,14 @@ def test_every_door_of_a_set_is_the_same(call: Any, value: Any) -> None:
         lambda: BOX.contains([0.0, 0.0], tol=np.nan),
         lambda: BOX.contains([0.0, 0.0], tol=[0.1, 0.2]),  # type: ignore[arg-type]
         lambda: BOX.plot(dims=(0, 0)),
+        lambda: BOX.project({0, 1}),  # type: ignore[arg-type]
+        lambda: BOX.lift(3, {0: 1, 1: 2}),  # type: ignore[arg-type]
+        lambda: BOX.plot("axes"),
+        lambda: BALL.surface([[1.0, 0.0], [0.0, 0.0]]),
+        lambda: conversions.from_halfspaces(np.zeros((2, 0))),
+        lambda: conversions.from_polytope(3),
+        lambda: conversions.from_polytope(BOX),
+        lambda: Certificate.from_dict(np.zeros(2)),  # type: ignore[arg-type]
         lambda: convex_hull([]),
         lambda: convex_hull([BOX, np.eye(2)]),  # type: ignore[list-item]
     ],
@@ -184,6 +196,28 @@ def test_every_door_of_a_set_is_the_same(call: Any, value: Any) -> None:
 def test_counts_and_coordinates_are_checked(call: Any) -> None:
     with pytest.raises((TypeError, ValueError), match="expected"):
         call()
+
+
+@pytest.mark.parametrize("value", [None, np.eye(2), "set", BOX.as_box, [BOX]])
+@pytest.mark.parametrize(
+    "call",
+    [
+        ConstrainedZonotope.of,
+        conversions.to_halfspaces,
+        conversions.to_cdd,
+        conversions.to_shapely,
+        conversions.to_polytope,
+        lambda P: write_ine(P, "set.ine"),
+        lambda P: write_ext(P, "set.ext"),
+        lambda P: BOX.intersects(HPolytope.simplex(2).translate([3.0, 3.0])).verify(P, BOX),
+        BOX.intersects,
+        BOX.minkowski_sum,
+        BOX.hausdorff,
+    ],
+)
+def test_what_is_no_set_is_named(call: Any, value: Any) -> None:
+    with pytest.raises(TypeError, match="expected an HPolytope"):
+        call(value)
 
 
 @pytest.mark.parametrize("function", [convex_hull, union_bounds])

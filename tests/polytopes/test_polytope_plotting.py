@@ -82,6 +82,15 @@ def test_dims_are_checked() -> None:
         CATALOGUE["cube"].plot(dims=(1, 1))
 
 
+def test_axes_of_another_dimension_are_refused() -> None:
+    plane, space = plt.figure().add_subplot(), plt.figure().add_subplot(projection="3d")
+    for ax, dims, words in ((plane, (0, 1, 2), "ax has 2 dimensions"), (space, (0, 1), "ax has 3 dimensions")):
+        for P in (CATALOGUE["cube"], CATALOGUE["cube"] | CATALOGUE["cube"]):
+            with pytest.raises(ValueError, match=words):
+                P.plot(ax, dims=dims)
+    plt.close("all")
+
+
 @pytest.mark.parametrize("scale", [[1e9, 1.0], [1.0, 1e9], [1e-6, 1e6], [1.0, 1.0]])
 def test_axes_of_very_different_extent_show_every_vertex(scale):
     """A box of 1e9 by 1 was drawn as a line: points within 1e-9 of the larger extent were one."""

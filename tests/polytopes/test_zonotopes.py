@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from exact_sets import polyhedron
+from exact_sets import polyhedron, shadow
 from kinds_of_sets import mapped
 from sets import CATALOGUE, EMPTY, UNBOUNDED
 
@@ -54,3 +54,30 @@ def test_points_zonotopes_and_wrong_ones() -> None:
         ConstrainedZonotope([0.0], [[1.0]], [[1.0]])
     with pytest.raises(TypeError, match="Z is a HPolytope"):
         HPolytope.from_zonotope(CATALOGUE["square"])  # type: ignore[arg-type]
+
+
+def lifted(Z: ConstrainedZonotope) -> HPolytope:
+    """All ``(x, xi)``, nothing rounded."""
+    n, g = Z.generators.shape
+    axes = np.hstack([np.zeros((g, n)), np.eye(g)])
+    image = np.hstack([np.eye(n), -Z.generators])
+    held = np.hstack([np.zeros((len(Z.offset), n)), Z.constraints])
+    return HPolytope(np.vstack([axes, -axes]), np.ones(2 * g), np.vstack([image, held]), np.append(Z.centre, Z.offset))
+
+
+@pytest.mark.parametrize("seed", [*range(12), *(pytest.param(k, marks=pytest.mark.slow) for k in range(12, 400))])
+def test_generators_that_only_hold_a_constraint_change_no_set(seed: int) -> None:
+    rng = np.random.default_rng([seed, 5])
+    n, g, more, c = 1 + seed % 3, int(rng.integers(1, 5)), int(rng.integers(4)), int(rng.integers(4))
+    G = np.hstack([rng.integers(-2, 3, (n, g)), np.zeros((n, more))]) * (seed % 7 > 0)
+    A = rng.integers(-2, 3, (c, g + more)) * (rng.random((c, g + more)) < 0.6)
+    Z = ConstrainedZonotope(rng.integers(-2, 3, n), G, A, rng.integers(-2, 3, c) / 2)
+    assert polyhedron(HPolytope.from_zonotope(Z)) == shadow(lifted(Z), list(range(n)))
+
+
+def test_rows_that_repeat_are_no_work() -> None:
+    P = HPolytope.simplex(3)
+    Q = HPolytope(np.vstack([P.A] * 100), np.concatenate([P.b] * 100))
+    again = HPolytope.from_zonotope(ConstrainedZonotope.of(Q))
+    assert again.b.size < 20
+    assert again.equals(P, tol=1e-12)
