@@ -28,7 +28,7 @@ def is_convex_ring(points: Floats) -> bool:
     back = any(t == 0 and u[0] * v[0] + u[1] * v[1] < 0 for t, u, v in zip(turns, edges, following, strict=True))
     if back or (min(turns, default=Fraction(0)) < 0 < max(turns, default=Fraction(0))):
         return False
-    ahead = [(y, x) > (0, 0) for x, y in edges]
+    ahead = [y > 0 or (y == 0 and x > 0) for x, y in edges]
     return sum(u != v for u, v in zip(ahead, ahead[1:] + ahead[:1], strict=True)) == 2
 
 

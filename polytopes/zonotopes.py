@@ -126,9 +126,10 @@ def _without_slacks(Z: ConstrainedZonotope) -> tuple[NDArray[np.int64], Floats, 
     of_row = {int(np.flatnonzero(Z.constraints[:, j])[0]): int(j) for j in slack if used[j]}  # one a row: the last
     dropped = [int(j) for j in slack if not used[j]] + list(of_row.values())
     kept = np.setdiff1d(np.arange(Z.generators.shape[1]), dropped)
-    loose = sorted(of_row)
+    loose = np.array(sorted(of_row), dtype=np.int64)
     rest = np.setdiff1d(np.arange(len(Z.offset)), loose)
-    rows, widths = Z.constraints[np.ix_(loose, kept)], [abs(Fraction(Z.constraints[i, of_row[i]])) for i in loose]
+    rows = Z.constraints[np.ix_(loose, kept)]
+    widths = [abs(Fraction(Z.constraints[i, j])) for i, j in sorted(of_row.items())]
     sides = [Fraction(v) for v in Z.offset[loose].tolist()]
     above = [up(v + w) for v, w in zip(sides, widths, strict=True)]
     below = [up(w - v) for v, w in zip(sides, widths, strict=True)]
