@@ -4,6 +4,7 @@ Bounds are quotients, rounded outward by less than one unit of the last place wh
 sums of products in twice the working precision, rounded up.
 """
 
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple, Self
 
@@ -15,6 +16,7 @@ from polytopes.native import Address, Entries, InCore, Integer, function
 from polytopes.rounding import check_rounding
 
 _COORDINATES = 16  # with more, vertices are too many
+_NONE, _, _KNOWN, _WIDE = range(4)  # what the core says of rows
 
 _box = function("fdi_box", *[Integer] * 2, *[Address] * 2, Entries, returns=Integer)
 _supports = function("fdi_box_supports", *[Integer] * 2, *[Address] * 2, Entries, returns=Integer)
@@ -24,6 +26,7 @@ class Box(NamedTuple):
     """A box that is not empty: its corners, its point, and its corners rounded inward are the rows of an array."""
 
     found: Floats
+    kind: int
 
     @property
     def corners(self) -> Floats:
@@ -40,7 +43,8 @@ class Box(NamedTuple):
         """The box of rows ``A x <= b``; None if they are none, or empty, or far from the origin."""
         check_rounding()
         found = np.empty((5, rows[0]))
-        return cls(found) if _box(*rows, found) else None
+        kind = _box(*rows, found)
+        return None if kind == _NONE else cls(found, kind)
 
     @property
     def rounded(self) -> NDArray[np.bool_]:
@@ -50,20 +54,19 @@ class Box(NamedTuple):
     @property
     def exact(self) -> bool:
         """Whether it is bounded and full-dimensional, and nothing in its corners was rounded."""
-        lower, upper = self.corners
-        return bool((lower < upper).all() and not self.rounded.any() and self.bounded)
+        return self.kind == _WIDE
 
     @property
     def vertices(self) -> Floats | None:
         """Its vertices (k, n) in lexicographic order; None if it is unbounded, one was rounded, or they are many."""
-        if self.point.size > _COORDINATES or self.rounded.any() or not self.bounded:
+        if self.kind < _KNOWN or self.point.size > _COORDINATES:
             return None
         ends = [(u, v) if u < v else (u,) for u, v in self.corners.T.tolist()]
         return np.array(list(product(*ends)))
 
     @property
     def bounded(self) -> bool:
-        return np.count_nonzero(np.isfinite(self.corners)) == 2 * self.point.size
+        return self.kind >= _KNOWN or bool(np.isfinite(self.corners).all())
 
     def supports(self, directions: Floats) -> Floats | None:
         """Upper bounds (k,) of the supports along directions (k, n); None if the numbers are of too different sizes."""
@@ -75,5 +78,12 @@ class Box(NamedTuple):
 
 def box_rows(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
     """Rows A (2 n, n) and b (2 n,) of a bounded box."""
-    axes = np.eye(lower.size)
-    return np.concatenate([axes, -axes]), np.concatenate([upper, -lower])
+    return both_ways(lower.size), np.concatenate([upper, -lower])
+
+
+@lru_cache(256)
+def both_ways(n: int) -> Floats:
+    """The axes of R^n and their opposites (2 n, n)."""
+    axes = np.vstack([np.eye(n), -np.eye(n)])
+    axes.setflags(write=False)
+    return axes

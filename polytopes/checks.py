@@ -88,15 +88,19 @@ def real_number(name: str, value: Any, *, least: float = -math.inf, finite: bool
 
 def whole_number(name: str, value: Any, *, least: int | None = None) -> int:
     """`value` as one integer, at least `least`; TypeError for anything but an integer, floats and truth values too."""
-    try:
-        if isinstance(value, bool | np.bool_):
-            raise TypeError
-        number = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name} is {value!r}, {_kind_of(value)}; expected an integer.") from None
+    number = value if type(value) is int else _index(name, value)
     if least is not None and number < least:
         raise ValueError(f"{name} is {number}; expected an integer of at least {least}.")
     return number
+
+
+def _index(name: str, value: Any) -> int:
+    try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} is {value!r}, {_kind_of(value)}; expected an integer.") from None
 
 
 def different_coordinates(name: str, value: Any, dim: int) -> list[int]:
@@ -107,7 +111,7 @@ def different_coordinates(name: str, value: Any, dim: int) -> list[int]:
         found = [whole_number(name, j) for j in value]
     except TypeError:
         raise TypeError(f"{name} is {value!r}; expected a sequence of integers below {dim}.") from None
-    if not found or len(set(found)) != len(found) or not all(0 <= j < dim for j in found):
+    if not found or len(set(found)) != len(found) or min(found) < 0 or max(found) >= dim:
         raise ValueError(f"{name} is {found}; expected different coordinates below {dim}, at least one.")
     return found
 
@@ -192,14 +196,14 @@ def _check_shape(name: str, array: Floats, shapes: Sequence[Shape], meaning: str
     if not shapes:
         return
     for shape in shapes:
-        if len(shape) == array.ndim and all(map(_fits, array.shape, shape)):
+        if len(shape) == array.ndim and _fits(array.shape, shape):
             return
     wanted = " or ".join(_shape_text(shape) for shape in shapes)
     raise ValueError(f"{name} has shape {array.shape}; expected {wanted}{', ' if meaning else ''}{meaning}.")
 
 
-def _fits(size: int, want: int | str) -> bool:
-    return size == want or isinstance(want, str)
+def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
+    return not [want for size, want in zip(shape, wanted, strict=True) if size != want and type(want) is not str]
 
 
 def _shape_text(shape: Shape) -> str:

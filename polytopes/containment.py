@@ -10,7 +10,7 @@ from polytopes.checks import Floats
 from polytopes.inclusion import half_spaces
 from polytopes.lengths import evened, lengths
 from polytopes.rows import Rows
-from polytopes.support import known_nonempty, support_points
+from polytopes.support import known_nonempty, support_points, supports_at_once
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,9 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
 
 def _surely_within(P: Rows, Q: Rows) -> bool:
     """Whether upper bounds of the supports of Q prove, without a tolerance, that it lies in P."""
-    values = None if Q.prepared is None or P.d.size else Q.prepared.supports(P.A)
+    if P.d.size:
+        return False
+    values = supports_at_once(Q, P.A)
     return values is not None and bool((values <= P.b).all())
 
 

@@ -21,10 +21,12 @@ _MOST_DIGITS = 5000  # of the exponent of ten of a decimal; 10 to a long one tak
 
 def hold_fractions(*parts: Any) -> bool:
     """Whether lists, tuples or arrays of objects hold a Fraction."""
-    return any(_holds(part) for part in parts)
+    return any(map(_holds, parts))
 
 
 def _holds(part: Any) -> bool:
+    if part is None:
+        return False
     if isinstance(part, np.ndarray):
         return part.dtype == object and any(isinstance(v, Fraction) for v in part.flat)
     return isinstance(part, Fraction) or (isinstance(part, list | tuple) and any(_holds(v) for v in part))

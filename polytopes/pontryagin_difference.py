@@ -8,14 +8,17 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.exact_sides import with_sides
-from polytopes.integers import exact_product, rounded_difference, whole
 from polytopes.linear_program import Program
+from polytopes.native import Address, Entries, Given, InCore, Integer, function
 from polytopes.outer_supports import exact_supports, lower_supports
 from polytopes.rows import Rows, Table, everything, nothing
 from polytopes.support import maxima
+from polytopes.vertices import known_vertices
 
 _CONSTANT = 1e-12  # of the terms of a linear form: variation that counts as none, unless all numbers are short
 _ROUNDED = 1e-9  # radius of a largest ball, relative to the size of b, from which rounding makes no difference
+
+_moved_rows = function("fdi_moved_rows", *[Integer] * 2, *[Address] * 2, Integer, Given, Entries, returns=Integer)
 
 
 def pontryagin_difference(P: Rows, Q: Rows) -> Table:
@@ -29,7 +32,7 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     UndecidedError
         If Q is flat or thin, or the result nearly flat, and Q too large for rational arithmetic.
     """
-    known = _by_exact_corners(P, Q)
+    known = _by_known_vertices(P, Q) or _by_floats(P, Q)
     if known is not None:
         return known
     result = maxima(Q, np.vstack([P.A, P.C, -P.C]))
@@ -52,20 +55,31 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     return near
 
 
-def _by_exact_corners(P: Rows, Q: Rows) -> Table | None:
-    """The rows moved inward, where the vertices of Q, its supports and what is left are floats; None if not."""
-    if P.d.size or Q.corners is None or not Q.corners.exact:
+def _by_known_vertices(P: Rows, Q: Rows) -> Table | None:
+    """The rows moved inward, rounded up, where the vertices of Q are floats and P has no equalities; else None."""
+    V = None if P.d.size else known_vertices(Q)
+    sides = None if V is None else moved_sides(P.in_core, V)
+    return None if sides is None else (P.A, sides, P.C, P.d)
+
+
+def moved_sides(rows: InCore, V: Floats) -> Floats | None:
+    """Sides (m,) of rows moved inward by points V (k, n), exact or rounded up; None if sizes are too different."""
+    sides = np.empty(rows[1])
+    return sides if _moved_rows(*rows, len(V), V, sides) else None
+
+
+def _by_floats(P: Rows, Q: Rows) -> Table | None:
+    """The rows moved inward by lower bounds of the supports, where floats settle them and rounding changes nothing."""
+    if P.d.size or Q.prepared is None or (P.short and Q.short):
         return None
-    V = Q.corners.points
-    if not (whole(P.A, P.dim) and whole(V, P.dim)):
-        values, certain = exact_product(P.A, V.T)
-        if not certain.all():
-            return None
-    else:
-        values = P.A @ V.T
-    supports = values.max(axis=1)
-    sides = P.b - supports
-    return None if rounded_difference(P.b, supports, sides).any() else (P.A, sides, P.C, P.d)
+    supports = Q.prepared.lower_supports(P.A)
+    if supports is None or not np.isfinite(supports).all():
+        return None
+    sides = np.nextafter(P.b - supports, np.inf)
+    left = Rows(P.A, sides).prepared
+    if left is None or left.radius <= _ROUNDED * np.abs(np.ldexp(P.b, left.row_powers)).max():
+        return None
+    return P.A, sides, P.C, P.d
 
 
 def _clear(program: Program, b: Floats) -> bool:

@@ -25,15 +25,15 @@ from polytopes.linear_program import (
     Program,
     small,
 )
-from polytopes.native import Address, Entries, Given, InCore, Integer, Real, address, function, handle, scratch
+from polytopes.native import Address, Entries, Given, InCore, Integer, Real, function, handle, scratch
 from polytopes.rounding import check_rounding
 
 _prepare = function("fdi_prepared", *[Integer] * 2, *[Address] * 2, *[Real] * 2, *[Address] * 2, returns=Integer)
 _ball = function("fdi_prepared_ball", *[Integer] * 2, *[Address] * 2, *[Real] * 2, Entries, Address, returns=Integer)
 _supports = function(
-    "fdi_prepared_supports", *[Integer] * 3, Address, Given, *[Real] * 2, Entries, *[Address] * 3, returns=Integer
+    "fdi_prepared_supports", *[Integer] * 3, Address, Given, *[Real] * 2, Entries, *[Address] * 4, returns=Integer
 )
-_facets = function("fdi_prepared_facets", *[Integer] * 2, Address, *[Entries] * 2, Address, returns=Integer)
+_facets = function("fdi_prepared_facets", *[Integer] * 2, Address, Entries, Address, returns=Integer)
 _size, _room, _ball_room, _facets_room = (
     lru_cache(1024)(function(f"fdi_prepared{name}", *[Integer] * 2, returns=Integer))
     for name in ("_size", "_room", "_ball_room", "_facets_room")
@@ -66,24 +66,45 @@ class PreparedRows(NamedTuple):
         """The centre (n,) of the largest ball in even units; it satisfies every row by more than is rounded."""
         return self.block[2 : 2 + self.rows[0]].copy()
 
+    @property
+    def radius(self) -> float:
+        """That of the largest ball in even units."""
+        return self.block.item(0)
+
     def supports(self, directions: Floats) -> Floats | None:
         """Upper bounds (k,) of the supports along directions (k, n), inf where unbounded; None if one is open."""
         values = np.empty(len(directions))
-        return values if self._settled(directions, values, None, None) else None
+        return values if self._settled(directions, values) else None
+
+    def lower_supports(self, directions: Floats) -> Floats | None:
+        """Lower bounds (k,) of the supports, a little below them, inf where unbounded; None if one is open."""
+        values, lower = np.empty((2, len(directions)))
+        if not self._settled(directions, values, lower=handle(lower)):
+            return None
+        return np.where(values < np.inf, lower, np.inf)
+
+    @property
+    def row_powers(self) -> NDArray[np.int64]:
+        """The exponents (m,) of the powers of two that bring the rows into even units."""
+        return self._parts()[9].view(np.int64)
 
     def maxima(self, directions: Floats) -> Maxima | None:
         """The same with points and multipliers."""
         k = len(directions)
         values, points, weights = np.empty(k), np.empty(directions.shape), np.zeros((k, self.b.size))
-        if not self._settled(directions, values, address(points), address(weights)):
+        if not self._settled(directions, values, handle(points), handle(weights)):
             return None
         return Maxima(values, points, weights, [UNBOUNDED if value == np.inf else OPTIMAL for value in values.tolist()])
 
-    def _settled(self, directions: Floats, values: Floats, points: int | None, weights: int | None) -> int:
+    def _settled(
+        self, directions: Floats, values: Floats, points: Any = None, weights: Any = None, lower: Any = None
+    ) -> int:
         check_rounding()
         n, m, k = *self.rows[:2], len(directions)
         room = scratch(_supports_room(n, m, k))
-        settled: int = _supports(n, m, k, self.at, directions, CLEAN, SHARP, values, points, weights, room)
+        settled: int = _supports(
+            n, m, k, self.at, directions, CLEAN, SHARP, values, points, weights, lower, room
+        )
         return settled
 
     def ball(self) -> tuple[Floats, float] | None:
@@ -96,15 +117,15 @@ class PreparedRows(NamedTuple):
     def facets(self) -> NDArray[np.int64] | None:
         """Numbers of a minimal set of the rows; None if rounding leaves one open."""
         n, m = self.rows[:2]
-        rows, doubtful = np.empty((2, m), np.int64)
-        count = _facets(n, m, self.at, rows, doubtful, scratch(_facets_room(n, m)))
-        return None if np.count_nonzero(doubtful[:count]) else rows[:count]
+        rows = np.empty(m, np.int64)
+        count = _facets(n, m, self.at, rows, scratch(_facets_room(n, m)))
+        return None if count < 0 else rows[:count]
 
     def program(self) -> Program:
         """The rows as a program, its largest ball known."""
         m, n = self.A.shape
         _, _, AT, rhs, norms, centre, weights, _, columns, rows = self._parts()
-        radius, powers, row_powers = self.block.item(0), columns.view(np.int64), rows.view(np.int64)
+        radius, powers, row_powers = self.radius, columns.view(np.int64), rows.view(np.int64)
         flat, AT, every = _everywhere(n), AT.reshape(n, m), np.arange(m)
         exact = EvenRows(self.A, self.b, flat, row_powers, powers)
         program = Program(self.A, self.b, flat, exact, AT, rhs, norms, row_powers, powers, every, None)
@@ -125,11 +146,3 @@ class PreparedRows(NamedTuple):
 def _everywhere(n: int) -> AffineSet:
     """R^n, the affine set of no equalities."""
     return affine_set(np.empty((0, n)), np.empty(0))
-
-
-@lru_cache(256)
-def both_ways(n: int) -> Floats:
-    """The axes of R^n and their opposites (2 n, n)."""
-    axes = np.vstack([np.eye(n), -np.eye(n)])
-    axes.setflags(write=False)
-    return axes

@@ -22,7 +22,7 @@ from flint import fmpq
 
 from polytopes.affine import AffineSet, affine_set
 from polytopes.affine_hull import explicit
-from polytopes.box import box_rows
+from polytopes.box import both_ways, box_rows
 from polytopes.checks import Floats
 from polytopes.errors import ProjectionLimitError, UnboundedError
 from polytopes.exact import row_to_floats
@@ -72,7 +72,7 @@ def project(
         If P is unbounded and the method needs vertices.
     """
     n, k = P.dim, len(keep)
-    known = _shadow_of_corners(P, list(keep)) if method == "auto" else None
+    known = _shadow_of_corners(P, list(keep)) or _shadow_on_a_line(P, keep) if method == "auto" else None
     if known is not None:
         return known
     if not known_nonempty(P):
@@ -110,6 +110,17 @@ def _shadow_of_corners(P: Rows, keep: list[int]) -> Table | None:
         return *box_rows(lower, upper), *no_equalities(len(keep))
     few = P.corners is not None and P.corners.exact and len(P.corners.points) <= _FEW_CORNERS
     return exact_hull(P.corners.points[:, keep]) if few and P.corners is not None else None
+
+
+def _shadow_on_a_line(P: Rows, keep: Sequence[int]) -> Table | None:
+    """The shadow on one coordinate by its supports, where floats settle them; None if not, or on more coordinates."""
+    if len(keep) > 1 or P.prepared is None or P.short:
+        return None
+    values = P.prepared.supports(both_ways(P.dim)[[keep[0], P.dim + keep[0]]])
+    if values is None:
+        return None
+    ends = values < np.inf
+    return both_ways(1)[ends], values[ends], *no_equalities(1)
 
 
 def _equalities_left(flat: AffineSet, keep: Sequence[int]) -> tuple[Floats, Floats]:

@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polytopes.box import Box
+from polytopes.box import Box, both_ways
 from polytopes.checks import Floats, real_array
 from polytopes.derived import derived
 from polytopes.emptiness import Emptiness, decide_emptiness
@@ -20,7 +20,7 @@ from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
 from polytopes.native import Address, InCore, Integer, function
 from polytopes.preparation import prepare
-from polytopes.prepared import PreparedRows, both_ways
+from polytopes.prepared import PreparedRows
 from polytopes.short_sets import Corners, has_short_rows, short_vertices
 from polytopes.value import Value
 
@@ -64,11 +64,22 @@ class Rows(Value):
         seen = _look(n, m, rows, sides)
         if seen == _NOT_FINITE:
             return False
-        own = self.__dict__
-        own["A"], own["b"] = np.ndarray((m, n), _FLOAT, rows), np.ndarray(m, _FLOAT, sides)
-        own["C"], own["d"] = C, d
-        own["in_core"], own["one_entry_a_row"] = (n, m, rows, sides), seen == _ONE_ENTRY_A_ROW
+        self._keep((n, m, rows, sides), C, d)
+        self.__dict__["one_entry_a_row"] = seen == _ONE_ENTRY_A_ROW
         return True
+
+    def _keep(self, rows: InCore, C: Floats, d: Floats) -> None:
+        n, m, A, b = rows
+        own = self.__dict__
+        own["in_core"], own["C"], own["d"] = rows, C, d
+        own["A"], own["b"] = np.ndarray((m, n), _FLOAT, A), np.ndarray(m, _FLOAT, b)
+
+    @classmethod
+    def from_core(cls, rows: InCore) -> Self:
+        """The set of rows of finite numbers that other sets have, without equalities."""
+        made = cls.__new__(cls)
+        made._keep(rows, *no_equalities(rows[0]))
+        return made
 
     def __reduce__(self) -> tuple[type[Self], Table]:
         return type(self), self.table  # what is derived from them is derived again

@@ -15,7 +15,7 @@ from polytopes.certificate import Certificate
 from polytopes.checks import Floats
 from polytopes.errors import UndecidedError
 from polytopes.exact import Multipliers, combine
-from polytopes.intersection import rows_of_both
+from polytopes.intersection import rows_in_common
 from polytopes.rows import Rows, a_set, same_space
 from polytopes.shown import Shown
 
@@ -76,7 +76,7 @@ class Intersects(Answer):
 
     def verify(self, P: Rows, Q: Rows) -> bool:
         """Whether multipliers prove, in rationals, that P and Q have no common point, and the plane is theirs."""
-        both = Rows(*rows_of_both(a_set(P, "P"), same_space(P, Q)))
+        both = rows_in_common(a_set(P, "P"), same_space(P, Q))
         if self.certificate is None or not self.certificate.verify(both):
             return False
         return self.plane == _plane(P, Q, self.certificate)
@@ -90,7 +90,7 @@ def intersects(P: Rows, Q: Rows) -> Intersects:
     UndecidedError
         If emptiness of the intersection could not be decided.
     """
-    answer = Rows(*rows_of_both(P, Q)).decided
+    answer = rows_in_common(P, Q).decided
     if answer.status == "nonempty":
         return Intersects(True, answer.witness)
     if answer.certificate is None:

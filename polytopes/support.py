@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polytopes.box import both_ways
 from polytopes.checks import Floats, real_array
 from polytopes.duality import equality_multipliers
 from polytopes.errors import EmptySetError, UndecidedError
 from polytopes.lengths import evened, lengths
 from polytopes.linear_program import UNDECIDED, Maxima
-from polytopes.prepared import both_ways
 from polytopes.rows import Rows
 from polytopes.shown import Shown
 
@@ -94,13 +94,17 @@ def support(P: Rows, directions: ArrayLike) -> float | Floats:
 
 def supports(P: Rows, directions: Floats) -> Floats:
     """``h_P(c)`` (k,) along directions (k, n), rounded up; -inf if P is empty."""
-    values = _of_box(P, directions)
-    if values is None and P.prepared is not None:
-        values = P.prepared.supports(directions)
+    values = supports_at_once(P, directions)
     if values is None:
         result = maxima(P, directions)
         values = np.full(len(directions), -np.inf) if result is None else result.values
     return values
+
+
+def supports_at_once(P: Rows, directions: Floats) -> Floats | None:
+    """The same by one call of the core, where P is a box or settled by floats; None if it is not."""
+    values = _of_box(P, directions)
+    return P.prepared.supports(directions) if values is None and P.prepared is not None else values
 
 
 def _of_box(P: Rows, directions: Floats) -> Floats | None:

@@ -54,6 +54,13 @@ def vertices(P: Rows) -> Floats:
     return program.lift(z)
 
 
+def known_vertices(P: Rows) -> Floats | None:
+    """The vertices (k, n) of a box or of a set of short rows, if they are floats and soon found; not to be written."""
+    if P.as_box is not None:
+        return P.as_box.vertices
+    return P.corners.points if P.corners is not None and P.corners.exact else None
+
+
 def quick_vertices(P: Rows) -> Floats | None:
     """The vertices (k, n) in lexicographic order, where one call of the core finds them; not to be written."""
     known = None if P.as_box is None else P.as_box.vertices

@@ -6,14 +6,11 @@
 #include "polytopes/sums.h"
 #include "vectors.h"
 
-static const double FARTHEST = 1e150;               /* bound of a coordinate; beyond, the general path refuses it */
-static const double SMALL = 1e-140, LARGE = 1e140; /* numbers between: their products, halved, are floats */
+static const double FARTHEST = 1e150; /* bound of a coordinate; beyond, the general path refuses it */
 
 typedef struct {
     double below, above; /* neighbours of the exact quotient, or it itself twice */
 } Quotient;
-
-static int moderate(double value) { return value == 0.0 || (fabs(value) > SMALL && fabs(value) < LARGE); }
 
 static Quotient quotient(double b, double a)
 {
@@ -65,7 +62,10 @@ EXPORTED integer fdi_look(integer n, integer m, const double *A, const double *b
     return found;
 }
 
-/* Whether rows A (m, n), b (m,) are those of a box that is not empty.
+enum { NO_BOX, SOME_BOX, KNOWN_BOX, WIDE_BOX };
+
+/* Whether rows A (m, n), b (m,) are those of a box that is not empty: known if it is bounded and no corner was rounded, and
+ * wide if it is not flat either.
  *
  * If so, bounds holds its lower and upper corner, rounded outward, infinite where there is none, and a point that
  * satisfies every row exactly: (3, n), and 2 n more to work in.
@@ -79,14 +79,16 @@ EXPORTED integer fdi_box(integer n, integer m, const double *A, const double *b,
     fill(upper, INFINITY, n);
     fill(least_upper, INFINITY, n);
     for (integer i = 0; i < m; i++)
-        if (!take_row(A + i * n, b[i], n, lower, upper, least_upper, most_lower)) return 0;
+        if (!take_row(A + i * n, b[i], n, lower, upper, least_upper, most_lower)) return NO_BOX;
+    int known = 1, wide = 1;
     for (integer j = 0; j < n; j++) {
-        if (most_lower[j] > least_upper[j]) return 0;
+        if (most_lower[j] > least_upper[j]) return NO_BOX;
         const double middle = 0.5 * most_lower[j] + 0.5 * least_upper[j];
         const int bounded = most_lower[j] > -INFINITY && least_upper[j] < INFINITY;
         point[j] = clipped(bounded ? middle : 0.0, most_lower[j], least_upper[j]);
+        known &= bounded && lower[j] == most_lower[j] && upper[j] == least_upper[j], wide &= lower[j] < upper[j];
     }
-    return 1;
+    return !known ? SOME_BOX : !wide ? KNOWN_BOX : WIDE_BOX;
 }
 
 /* Upper bounds (k,) of the supports of a box along directions (k, n); 0 if its numbers are too uneven for that.

@@ -46,14 +46,27 @@ EXPORTED integer fdi_integer_rows(integer m, integer d, const double *table, int
     return 1;
 }
 
-/* Whether rows A (m, n), b (m,) are short, of integers below 2^32; for points, whose b is one, without it. (n + 1,) to
- * work in. */
+/* Whether row i follows from another with the same normal, or the same row comes earlier. */
+static int is_implied(integer n, integer m, const double *A, const double *b, integer i)
+{
+    for (integer k = 0; k < m; k++) {
+        if (k == i || b[k] > b[i] || (b[k] == b[i] && k > i)) continue;
+        integer j = 0;
+        while (j < n && A[k * n + j] == A[i * n + j]) j++;
+        if (j == n) return 1;
+    }
+    return 0;
+}
+
+/* Whether rows A (m, n), b (m,) are short, of integers below 2^32, but for some that follow from others with the same
+ * normals; for points, whose b is one, without it. (n + 1,) to work in. */
 EXPORTED integer fdi_short(integer n, integer m, const double *A, const double *b, double *block)
 {
     Memory memory = {block, 0};
     integer *row = integers(&memory, n + 1);
     for (integer i = 0; i < m; i++)
-        if (!integer_row(A + i * n, b ? b[i] : 1.0, n + 1, BITS_OF_ENTRIES, row)) return 0;
+        if (!integer_row(A + i * n, b ? b[i] : 1.0, n + 1, BITS_OF_ENTRIES, row) && !(b && is_implied(n, m, A, b, i)))
+            return 0;
     return 1;
 }
 
@@ -104,13 +117,17 @@ EXPORTED integer fdi_exact_vertices(integer n, integer m, const double *A, const
 {
     const integer d = n + 1;
     const Work work = lay_out(block, n, m, room);
+    integer k = 0;
     for (integer i = 0; i < m; i++) {
-        integer *row = work.rows + i * d;
-        if (!integer_row(A + i * n, b[i], d, BITS_OF_ENTRIES, row)) return OVERFLOWS;
-        row[n] = -row[n];
+        integer *row = work.rows + k * d;
+        if (!integer_row(A + i * n, b[i], d, BITS_OF_ENTRIES, row)) {
+            if (!is_implied(n, m, A, b, i)) return OVERFLOWS;
+            continue;
+        }
+        row[n] = -row[n], k++;
     }
-    for (integer j = 0; j < d; j++) work.rows[m * d + j] = j == n ? -1 : 0;
-    const integer count = fdi_pointed_cone(d, m + 1, work.rows, most_rays, room, work.rays, work.rest);
+    for (integer j = 0; j < d; j++) work.rows[k * d + j] = j == n ? -1 : 0;
+    const integer count = fdi_pointed_cone(d, k + 1, work.rows, most_rays, room, work.rays, work.rest);
     said[0] = 1.0;
     for (integer r = 0; r < count; r++) {
         const integer *ray = work.rays + r * d;
@@ -119,8 +136,8 @@ EXPORTED integer fdi_exact_vertices(integer n, integer m, const double *A, const
         for (integer j = 0; j < n; j++) points[r * n + j] = (double)ray[j] / (double)ray[n];
     }
     if (count > 0 && said[1] != 0.0) {
-        const uint64_t *on = rows_of_rays(d, m + 1, room, work.rest);
-        said[1] = volume_of(n, m + 1, count, points, on, (m + 64) / 64, block + fdi_exact_set_room(n, m, room));
+        const uint64_t *on = rows_of_rays(d, k + 1, room, work.rest);
+        said[1] = volume_of(n, k + 1, count, points, on, (k + 64) / 64, block + fdi_exact_set_room(n, m, room));
     }
     if (count > 0) put_in_order(n, count, points, (double *)(void *)work.rays);
     return count == 0 ? OVERFLOWS : count;

@@ -10,6 +10,7 @@
  * clarkson.c     the same over the facets that are known so far
  * elimination.c  Fourier-Motzkin elimination
  * box.c          what needs no program
+ * moved_rows.c   rows moved inward by a set of known vertices
  * questions.c    rows as they are given, asked in one call
  * cone.c         extreme rays of cones in general position, proven in floats
  * near_cone.c    extreme rays of cones that are not in general position, in floats

@@ -43,15 +43,19 @@ EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const do
     return fdi_strictly_inside(d, m, set.at, set.b, set.centre, NULL, NULL, scratch);
 }
 
-EXPORTED integer fdi_prepared_facets_room(integer d, integer m) { return m + irredundant_room(d, m); }
+EXPORTED integer fdi_prepared_facets_room(integer d, integer m) { return 2 * m + irredundant_room(d, m); }
 
-/* Numbers of a minimal set of the rows of a prepared set, and which of them are doubtful (m,); how many. */
-EXPORTED integer fdi_prepared_facets(integer d, integer m, double *prepared, integer *chosen, integer *doubtful,
-                                     double *block)
+/* Numbers (m,) of a minimal set of the rows of a prepared set: how many, or -1 if rounding leaves one open. */
+EXPORTED integer fdi_prepared_facets(integer d, integer m, double *prepared, integer *chosen, double *block)
 {
     Prepared set;
+    Memory memory = {block, 0};
+    integer *doubtful = integers(&memory, m);
     lay_out_prepared(&set, prepared, d, m);
-    return fdi_irredundant(d, m, set.at, set.b, set.centre, chosen, doubtful, block);
+    const integer count = fdi_irredundant(d, m, set.at, set.b, set.centre, chosen, doubtful, block + memory.used);
+    for (integer k = 0; k < count; k++)
+        if (doubtful[k]) return -1;
+    return count;
 }
 
 EXPORTED integer fdi_prepared_ball_room(integer d, integer m) { return d + 1 + 2 * m + fdi_interior_room(d, m); }
@@ -243,15 +247,38 @@ static int bounds_of(Prepared *set, integer d, integer m, integer k, const Quest
     return 0;
 }
 
+/* A lower bound of a form over a prepared set: its value at a point z, drawn towards the centre of the largest ball until
+ * it breaks no row, whatever was rounded. */
+static double lower_bound(const Prepared *set, integer d, integer m, const double *form, const double *z)
+{
+    const double *c = set->centre, unit = (double)(d + 3) * EPS;
+    double back = 0.0, value = 0.0, inside = 0.0, sizes = 0.0;
+    for (integer i = 0; i < m; i++) {
+        double beyond = -set->b[i], slack = set->b[i], size = fabs(set->b[i]), other = size;
+        for (integer j = 0; j < d; j++) {
+            const double a = set->at[j * m + i];
+            beyond += a * z[j], size += fabs(a * z[j]);
+            slack -= a * c[j], other += fabs(a * c[j]);
+        }
+        const double broken = larger(beyond, 0.0) + unit * size, room = larger(slack - unit * other, 0.0);
+        if (broken > 0.0) back = larger(broken / (broken + room), back);
+    }
+    for (integer j = 0; j < d; j++) {
+        value += form[j] * z[j], inside += form[j] * c[j];
+        sizes += fabs(form[j] * z[j]) + fabs(form[j] * c[j]);
+    }
+    return value - back * larger(value - inside, 0.0) - 3.0 * unit * sizes;
+}
+
 /* Upper bounds (k,) of the supports of a prepared set along directions (k, d), infinite where it is unbounded.
  *
  * 0 if a bound is neither within `clean` of the sizes of its terms nor within `sharp` of the radius (and rounding) of the
  * value that was found, or a form was not solved. Points (k, d) and multipliers of the rows (k, m), zero before, are left
- * if there is room for them (else NULL). They mean something only where values are finite.
+ * if there is room for them (else NULL), and lower bounds (k,). They mean something only where values are finite.
  */
 EXPORTED integer fdi_prepared_supports(integer d, integer m, integer k, double *prepared, const double *directions,
                                        double clean, double sharp, double *values, double *points, double *weights,
-                                       double *block)
+                                       double *lower, double *block)
 {
     Prepared set;
     Question question;
@@ -269,8 +296,10 @@ EXPORTED integer fdi_prepared_supports(integer d, integer m, integer k, double *
         if (status[q] != OPTIMAL || !(gap <= room)) return 0;
         values[q] = times_power(question.gaps[q], question.tops[q]);
         if (!(fabs(values[q]) < INFINITY)) return 0;
+        const double *z = question.found + q * d;
+        if (lower) lower[q] = times_power(lower_bound(&set, d, m, question.forms + q * d, z), question.tops[q]);
         if (points)
-            for (integer j = 0; j < d; j++) points[q * d + j] = times_power(question.found[q * d + j], set.s[j]);
+            for (integer j = 0; j < d; j++) points[q * d + j] = times_power(z[j], set.s[j]);
         if (weights)
             for (integer i = 0; i < m; i++)
                 weights[q * m + i] = smaller(times_power(weights[q * m + i], set.r[i] + question.tops[q]), DBL_MAX);

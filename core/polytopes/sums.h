@@ -12,6 +12,10 @@
 static const double UNDERFLOW_BELOW = 1e-290; /* products below may lose what rounding left */
 static const double TINY = 1e-300;
 
+static const double SMALL = 1e-140, LARGE = 1e140; /* numbers between: their products, halved, are floats */
+
+static inline int moderate(double value) { return value == 0.0 || (fabs(value) > SMALL && fabs(value) < LARGE); }
+
 typedef struct {
     double total, lost; /* what is summed so far is total + lost, */
     double error;       /* up to this */

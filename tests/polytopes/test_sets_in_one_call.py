@@ -14,6 +14,7 @@ from polytopes.general_position import rows_around, summed_volume
 from polytopes.integers import floats_of_points, integer_rows, is_short
 from polytopes.minkowski_weyl import ExactGenerators, distinct, generators_of
 from polytopes.outward import float_rows
+from polytopes.pontryagin_difference import moved_sides
 from polytopes.rows import Rows
 from polytopes.short_sets import are_short, has_short_rows, short_hull, short_unit, short_vertices, short_volume
 
@@ -64,6 +65,59 @@ def test_vertices_of_short_rows_are_those_in_integers_of_any_size() -> None:
         floats = [[Fraction(v) for v in row] for row in points.tolist()]
         assert found.exact == (fractions == floats)
     assert known > 60
+
+
+def test_rows_that_others_with_their_normals_imply_need_not_be_short() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(30):
+        A, b = short_rows(rng)
+        b = b[: len(A)]
+        chosen = rng.integers(0, len(A), 3)
+        more = b[chosen] + np.abs(b[chosen]) * 1e-9 + 0.1
+        plain, found = short_vertices(Rows(A, b).in_core), short_vertices(Rows(*both(A[chosen], more, A, b)).in_core)
+        assert (plain is None) == (found is None)
+        assert plain is None or (np.array_equal(plain.points, found.points) and plain.exact == found.exact)
+        volumes = [short_volume(Rows(*rows).in_core) for rows in ((A, b), both(A, b, A[chosen], more))]
+        assert volumes[0] == volumes[1]
+    A, b = np.array([[1.0], [1.0], [-1.0]]), np.array([0.1, 0.1, 0.0])
+    assert not has_short_rows(Rows(A, b).in_core)  # a row is not implied by itself
+
+
+def both(A: Floats, b: Floats, A2: Floats, b2: Floats) -> tuple[Floats, Floats]:
+    return np.vstack([A, A2]), np.append(b, b2)
+
+
+@pytest.mark.parametrize("decimals", [0, 1, 20])
+def test_rows_moved_inward_by_points_are_exact_or_rounded_up(decimals: int) -> None:
+    rng, rounded = np.random.default_rng(decimals), 0
+    for _ in range(60):
+        n, unit = int(rng.integers(1, 4)), 2.0 ** int(rng.integers(-60, 60))
+        A, b, V = (np.round(rng.uniform(-9, 9, size), decimals) for size in ((5, n), 5, (4, n)))
+        sides = moved_sides(Rows(A, b * unit).in_core, V * unit)
+        for row, given, side in zip(A, b, sides, strict=True):
+            value = min(Fraction(given * unit) - exact_form(row, v * unit) for v in V)
+            assert value <= side <= value + 2 * Fraction(np.spacing(abs(side)))
+            rounded += side != value
+    assert (rounded == 0) == (decimals == 0)
+    assert moved_sides(Rows([[1e200]], [1.0]).in_core, np.ones((1, 1))) is None
+
+
+def test_lower_bounds_of_supports_are_never_above_them_and_near() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        n, m = int(rng.integers(1, 4)), int(rng.integers(0, 4))
+        units = 2.0 ** rng.integers(-30, 30, n)
+        A = np.vstack([rng.standard_normal((m, n)), np.eye(n), -np.eye(n)]) * units
+        A, b = np.vstack([A, A[:2]]), np.append(rng.uniform(0.1, 1.0, len(A)), [0.9, 0.8])
+        P, directions = Rows(A, b), np.vstack([rng.standard_normal((5, n)) * units, A])
+        V = generators_of(integer_form(A, b, A[:0], b[:0])).vertices.tolist()
+        corners = [[Fraction(int(v), int(row[-1])) for v in row[:-1]] for row in V]
+        assert P.prepared is not None
+        for c, low in zip(directions, P.prepared.lower_supports(directions), strict=True):
+            exact = max(sum(Fraction(u) * v for u, v in zip(c.tolist(), x, strict=True)) for x in corners)
+            assert low <= exact <= low + 1e-13 * max(1.0, abs(low))
+    half = Rows([[1.0, 0.0]], [1.0]).prepared
+    assert half is None or half.lower_supports(np.array([[0.0, 1.0]])) == [np.inf]
 
 
 def test_hulls_of_short_points_are_those_in_integers_of_any_size() -> None:
