@@ -78,7 +78,7 @@ class Box(NamedTuple):
 
 def box_rows(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
     """Rows A (2 n, n) and b (2 n,) of a bounded box."""
-    return both_ways(lower.size), np.concatenate([upper, -lower])
+    return both_ways(lower.size), np.concatenate([upper, 0.0 - lower])
 
 
 @lru_cache(256)

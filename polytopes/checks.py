@@ -10,7 +10,8 @@ import math
 import operator
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Set
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -62,8 +63,8 @@ def real_array(
         If it has another shape, a missing entry, an infinity, or a number that no float equals.
     """
     array = np.array(value, order="C") if _is_float_array(value) else _converted(name, value, missing)
-    if array.shape not in shapes:
-        _check_shape(name, array, shapes, meaning)
+    if shapes and not _fit(array.shape, shapes):
+        raise ValueError(_misfit(name, array.shape, shapes, meaning))
     if math.isfinite(np.vdot(array, array)) or np.isfinite(array).all():  # squares may leave the floats
         return array
     if not missing and np.isnan(array).any():
@@ -192,18 +193,15 @@ def _check_kind(name: str, raw: NDArray[Any], value: Any) -> None:
         raise TypeError(f"{name} {what}; expected real numbers. {_ADVICE.get(kind, 'Convert it to floats first')}.")
 
 
-def _check_shape(name: str, array: Floats, shapes: Sequence[Shape], meaning: str) -> None:
-    if not shapes:
-        return
-    for shape in shapes:
-        if len(shape) == array.ndim and _fits(array.shape, shape):
-            return
+@lru_cache(4096)
+def _fit(shape: tuple[int, ...], shapes: tuple[Shape, ...]) -> bool:
+    alike = [zip(shape, wanted, strict=True) for wanted in shapes if len(shape) == len(wanted)]
+    return any(all(size == want or isinstance(want, str) for size, want in pairs) for pairs in alike)
+
+
+def _misfit(name: str, shape: tuple[int, ...], shapes: tuple[Shape, ...], meaning: str) -> str:
     wanted = " or ".join(_shape_text(shape) for shape in shapes)
-    raise ValueError(f"{name} has shape {array.shape}; expected {wanted}{', ' if meaning else ''}{meaning}.")
-
-
-def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
-    return not [want for size, want in zip(shape, wanted, strict=True) if size != want and type(want) is not str]
+    return f"{name} has shape {shape}; expected {wanted}{', ' if meaning else ''}{meaning}."
 
 
 def _shape_text(shape: Shape) -> str:

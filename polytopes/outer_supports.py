@@ -18,7 +18,7 @@ from polytopes.integers import up
 from polytopes.linear_program import Maxima
 from polytopes.outward_normals import support_of
 from polytopes.rows import Rows
-from polytopes.support import known_nonempty, maxima
+from polytopes.support import known_nonempty, maxima, supports_at_once
 
 _EPS = float(np.finfo(np.float64).eps)
 _TINY = float(np.finfo(np.float64).tiny)
@@ -39,9 +39,10 @@ def upper_supports(P: Rows, directions: Floats, uncertain: Floats | None = None)
     UndecidedError
         If a support could not be found.
     """
-    of_box = None if uncertain is not None or P.as_box is None else P.as_box.supports(directions)
-    if of_box is not None:
-        return of_box
+    of_floats = uncertain is None and (P.as_box is not None or not P.short)
+    at_once = supports_at_once(P, directions) if of_floats else None
+    if at_once is not None and (P.as_box is not None or np.isfinite(at_once).all()):
+        return at_once
     if uncertain is None and P.exact is not None:
         return np.array([up(support_of(P.exact, row)) for row in directions])
     best = maxima(P, directions)

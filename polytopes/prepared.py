@@ -34,11 +34,18 @@ _supports = function(
     "fdi_prepared_supports", *[Integer] * 3, Address, Given, *[Real] * 2, Entries, *[Address] * 4, returns=Integer
 )
 _facets = function("fdi_prepared_facets", *[Integer] * 2, Address, Entries, Address, returns=Integer)
-_size, _room, _ball_room, _facets_room = (
-    lru_cache(1024)(function(f"fdi_prepared{name}", *[Integer] * 2, returns=Integer))
-    for name in ("_size", "_room", "_ball_room", "_facets_room")
+_size, _room = (function(f"fdi_prepared_{name}", *[Integer] * 2, returns=Integer) for name in ("size", "room"))
+_ball_room, _facets_room = (
+    lru_cache(1024)(function(f"fdi_prepared_{name}_room", *[Integer] * 2, returns=Integer))
+    for name in ("ball", "facets")
 )
 _supports_room = lru_cache(1024)(function("fdi_prepared_supports_room", *[Integer] * 3, returns=Integer))
+
+
+@lru_cache(1024)
+def _sizes(n: int, m: int) -> tuple[int, int]:
+    """Doubles of the block of a set and of what is worked in; none where a set is not for the core."""
+    return (_size(n, m), _room(n, m)) if m and small(n, m) else (0, 0)
 
 
 class PreparedRows(NamedTuple):
@@ -54,12 +61,12 @@ class PreparedRows(NamedTuple):
     def of(cls, A: Floats, b: Floats, rows: InCore) -> Self | None:
         """The rows A (m, n), b (m,) prepared; None where floats do not settle at once that a ball fits in."""
         check_rounding()
-        n, m = rows[:2]
-        if not m or not small(n, m):
+        size, room = _sizes(rows[0], rows[1])
+        if not size:
             return None
-        block = np.empty(_size(n, m))
+        block = np.empty(size)
         at = handle(block)
-        return cls(A, b, rows, block, at) if _prepare(*rows, WIDEST, SMALL_BALL, at, scratch(_room(n, m))) else None
+        return cls(A, b, rows, block, at) if _prepare(*rows, WIDEST, SMALL_BALL, at, scratch(room)) else None
 
     @property
     def centre(self) -> Floats:

@@ -72,7 +72,7 @@ def project(
         If P is unbounded and the method needs vertices.
     """
     n, k = P.dim, len(keep)
-    known = _shadow_of_corners(P, list(keep)) or _shadow_on_a_line(P, keep) if method == "auto" else None
+    known = _shadow_at_once(P, list(keep)) if method == "auto" else None
     if known is not None:
         return known
     if not known_nonempty(P):
@@ -103,17 +103,18 @@ def project(
     return A, b, C, d
 
 
-def _shadow_of_corners(P: Rows, keep: list[int]) -> Table | None:
-    """The shadow of a box, or the hull of projected vertices that are few and floats of few bits; None if neither."""
+def _shadow_at_once(P: Rows, keep: list[int]) -> Table | None:
+    """The shadow of a box, the hull of projected vertices that are few and floats of few bits, or a shadow on a line by
+    supports that floats settle; None if it is none of these.
+    """
     if P.as_box is not None and P.as_box.exact:
         lower, upper = P.as_box.corners[:, keep]
         return *box_rows(lower, upper), *no_equalities(len(keep))
-    few = P.corners is not None and P.corners.exact and len(P.corners.points) <= _FEW_CORNERS
-    return exact_hull(P.corners.points[:, keep]) if few and P.corners is not None else None
-
-
-def _shadow_on_a_line(P: Rows, keep: Sequence[int]) -> Table | None:
-    """The shadow on one coordinate by its supports, where floats settle them; None if not, or on more coordinates."""
+    if P.corners is not None and P.corners.exact and len(P.corners.points) <= _FEW_CORNERS:
+        points = P.corners.points[:, keep]
+        if len(keep) > 1:
+            return exact_hull(points)
+        return *box_rows(points.min(axis=0), points.max(axis=0)), *no_equalities(1)
     if len(keep) > 1 or P.prepared is None or P.short:
         return None
     values = P.prepared.supports(both_ways(P.dim)[[keep[0], P.dim + keep[0]]])

@@ -119,14 +119,21 @@ class Rows(Value):
         """The rows as a box, if they are one that is not empty."""
         return Box.of(self.in_core) if self.one_entry_a_row and not self.d.size else None
 
+    @property
+    def point_at_once(self) -> Floats | None:
+        """A point (n,) of a box, or one that floats find with slack beyond rounding; None if it takes longer."""
+        if self.as_box is not None:
+            return self.as_box.point
+        return None if self.prepared is None else self.prepared.centre
+
     @derived
     def decided(self) -> Emptiness:
         """Emptiness of the rows, decided once."""
-        if self.as_box is not None:
-            return Emptiness("nonempty", self.as_box.point, None, "a point between the bounds of a box")
-        if self.prepared is not None:
-            return Emptiness("nonempty", self.prepared.centre, None, "a point with slack beyond rounding")
-        return decide_emptiness(self, self.program)
+        point = self.point_at_once
+        if point is None:
+            return decide_emptiness(self, self.program)
+        how = "a point between the bounds of a box" if self.as_box else "a point with slack beyond rounding"
+        return Emptiness("nonempty", point, None, how)
 
     @derived
     def even_inequalities(self) -> tuple[Floats, Floats, Floats]:

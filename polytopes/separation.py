@@ -90,7 +90,11 @@ def intersects(P: Rows, Q: Rows) -> Intersects:
     UndecidedError
         If emptiness of the intersection could not be decided.
     """
-    answer = rows_in_common(P, Q).decided
+    both = rows_in_common(P, Q)
+    point = both.point_at_once
+    if point is not None:
+        return Intersects(True, point)
+    answer = both.decided
     if answer.status == "nonempty":
         return Intersects(True, answer.witness)
     if answer.certificate is None:

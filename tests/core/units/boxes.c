@@ -45,12 +45,14 @@ static void supports_of_a_box(void)
 static void what_is_none(void)
 {
     const double askew[] = {1.0, 1.0}, twice[] = {1.0, -1.0}, apart[] = {-1.0, -1.0}, touching[] = {1.0, -1.0};
+    const double both[] = {2.0, -1.0};
     const double far[] = {1e200}, one[] = {1.0}, third[] = {3.0}, zero[] = {0.0}, minus[] = {-1.0};
     double bounds[10];
     CHECK(fdi_box(2, 1, askew, one, bounds) == 0);
     CHECK(fdi_box(1, 2, twice, apart, bounds) == 0);   /* empty */
-    CHECK(fdi_box(1, 2, twice, touching, bounds) == 1); /* a point */
+    CHECK(fdi_box(1, 2, twice, touching, bounds) == 2); /* a point */
     CHECK(bounds[0] == 1.0 && bounds[1] == 1.0 && bounds[2] == 1.0);
+    CHECK(fdi_box(1, 2, twice, both, bounds) == 3 && bounds[0] == 1.0 && bounds[1] == 2.0);
     CHECK(fdi_box(1, 1, one, far, bounds) == 0);
     CHECK(fdi_box(1, 1, zero, minus, bounds) == 0);
     CHECK(fdi_box(1, 1, zero, one, bounds) == 1); /* everything */
