@@ -1,11 +1,11 @@
 """Every operation of a tape beside ball arithmetic, over random and extreme arguments: points outside must be zero.
 
 Run with ``python -m benchmarks.tape_operations --points 1000000 --out points.jsonl``: so many for each operation and
-for random tapes of many; what the file already holds is not run again, so it may be interrupted at any time. Half of
-the operands are sums of two variables; two boxes in seven have ends such as 0, 5e-324 or 1.7e308, others are a few
-doubles about multiples of pi/2 or in units of 2^-300 to 2^300. Portion i of an operation is drawn from seed
-(SEED, operation, i). The elementary functions of the core get ``--elementary`` points each, a tenth of them where
-rounding is worst. Exit code 1 if anything is outside.
+for random tapes of many, those of refused boxes not counted; what the file already holds is not run again, so it may
+be interrupted at any time. Half of the operands are sums of two variables; two boxes in seven have ends such as 0,
+5e-324 or 1.7e308, others are a few doubles about multiples of pi/2 or in units of 2^-300 to 2^300. Portion i of an
+operation is drawn from seed (SEED, operation, i). The elementary functions of the core get ``--elementary`` points
+each, a tenth of them where rounding is worst. Exit code 1 if anything is outside.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from rich.progress import track
+from rich.progress import Progress, track
 
 from benchmarks._observers import console, table
 from benchmarks.nonlinear import stored
@@ -53,20 +53,31 @@ def main() -> None:
 
 def _operations(points: int, out: Path | None) -> tuple[int, int]:
     """Cases and failures of the operations of a tape."""
-    portions = -(-points // (BOXES * POINTS))
-    wanted = [(name, i) for i in range(portions) for name in EXAMINED]
-    found = {} if out is None else {(part["name"], part["portion"]): Counter(part["count"]) for part in stored(out)}
-    for name, i in track([key for key in wanted if key not in found], description="portions", console=console):
-        found[name, i] = EXAMINED[name](np.random.default_rng([SEED, *name.encode(), i]), BOXES, POINTS)
-        if out is not None:
-            with out.open("a", encoding="utf-8") as file:
-                file.write("\n" + json.dumps({"name": name, "portion": i, "count": found[name, i]}))
-    counts = {name: sum((found[name, i] for i in range(portions)), Counter[str]()) for name in EXAMINED}
+    kept = {} if out is None else {(part["name"], part["portion"]): Counter(part["count"]) for part in stored(out)}
+    counts: dict[str, Counter[str]] = {name: Counter() for name in EXAMINED}
+    with Progress(console=console) as progress:
+        task = progress.add_task("points", total=points * len(EXAMINED))
+        for name, count in counts.items():
+            portion = 0
+            while count["points"] < points:
+                found = kept.get((name, portion)) or _examine(name, portion, out)
+                count.update(found)
+                progress.advance(task, found["points"])
+                portion += 1
     shown = ("points", *OUTSIDE, "refused")
     rows = [[name, *(count[what] for what in shown)] for name, count in counts.items()]
     table("Operations beside ball arithmetic", ["operation", *shown], rows)
     outside = sum(count[what] for count in counts.values() for what in OUTSIDE)
     return sum(count["points"] for count in counts.values()), outside
+
+
+def _examine(name: str, portion: int, out: Path | None) -> Counter[str]:
+    """What a portion of an operation gives, added to the file."""
+    found = EXAMINED[name](np.random.default_rng([SEED, *name.encode(), portion]), BOXES, POINTS)
+    if out is not None:
+        with out.open("a", encoding="utf-8") as file:
+            file.write("\n" + json.dumps({"name": name, "portion": portion, "count": found}))
+    return found
 
 
 def _elementary(points: int) -> tuple[int, int]:
