@@ -87,12 +87,17 @@ def alarm_of(
     """
     if observer is None:
         return Alarm(name, sample, time, proof, source)
-    if isinstance(observer.model, NonlinearModel):
-        source = {**source, "model": NONLINEAR}
-    elif observer.jitter is not None:
-        source = {**source, "model": STAMPED}
+    if (kind := kind_of_model(observer)) is not None:
+        source = {**source, "model": kind}
     digest, promises = digest_of_alarm(observer, proof), promises_of(observer)
     return Alarm(name, sample, time, proof, source, digest, promises, _scheduled(observer, proof, schedule))
+
+
+def kind_of_model(observer: Observer) -> str | None:
+    """What the source of an alarm says of its model, so that it is told what of that is not checked; None = nothing."""
+    if isinstance(observer.model, NonlinearModel):
+        return NONLINEAR
+    return None if observer.jitter is None else STAMPED
 
 
 def promises_of(observer: Observer) -> dict[str, tuple[Array, Array]]:

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from svo.detection.bank_alarms import bank_of_source, digest_of_alarm, promises_of
+from svo.detection.bank_alarms import bank_of_source, digest_of_alarm, kind_of_model, promises_of
 from svo.detection.proof_file import Chain
 from svo.isolation import Alarm, AlarmCheck, ArchitectureII, Bank, read_alarms, verify_alarms
 from svo.logs.drive import drive
@@ -53,6 +53,14 @@ def _unknowns(alarm: Alarm, model: UncertainModel) -> str | None:
     else:
         return None
     return f"the {what} not those of the plant's model {alarm.observer!r}"
+
+
+def _kind(alarm: Alarm, observer: Observer) -> str | None:
+    """How an alarm's source names another kind of model than the plant's, whose check leaves other things out."""
+    kind, stated = kind_of_model(observer), alarm.source.get("model")
+    if stated == kind:
+        return None
+    return f"source says 'model': {stated!r:.80}; expected {kind!r} of the plant's model {alarm.observer!r}"
 
 
 def _around_linearisations(alarm: Alarm, model: NonlinearModel) -> str | None:
@@ -116,13 +124,12 @@ class PlantModels:
         observer = self.bank(alarm).observers.get(alarm.observer)
         if observer is None:
             return f"the plant's bank has no model {alarm.observer!r:.80}"
-        if isinstance(observer.model, NonlinearModel):
+        different = _kind(alarm, observer)
+        if different is None and isinstance(observer.model, NonlinearModel):
             different = _around_linearisations(alarm, observer.model)
-        else:
+        elif different is None:
             different = self._matrices(alarm, observer) or _unknowns(alarm, observer.model)
-        if different is not None:
-            return different
-        different = _promises(alarm, observer)
+        different = different or _promises(alarm, observer)
         if different is not None:
             return different
         if alarm.model is not None and alarm.model != digest_of_alarm(observer, alarm.certificate):

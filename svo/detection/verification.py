@@ -15,6 +15,7 @@ from svo.detection.found import Detection
 from svo.detection.proof_file import ProofFile
 from svo.isolation import NOT_CHECKED, Alarm, AlarmCheck, check_alarm, read_alarms, verify_alarms
 from svo.logs.log import Log
+from svo.observers.window.certificate import BOUNDS_OF_S
 from svo.plant import MonitoredPlant
 from svo.plant.description import find_plant
 from svo.plant.log_file import read_log
@@ -61,8 +62,13 @@ class Verification(Shown):
         proven = f"{self.proven} of {len(self.checks)} alarms proven in exact arithmetic"
         reasons = [check.reason for check in self.checks if check.ok]
         left_out = [text for text in NOT_CHECKED.values() if any(text in reason for reason in reasons)]
-        given = f", given {self.given}" if self.given and self.proven else ""
+        given = f", given {self._given(reasons)}" if self.given and self.proven else ""
         return f"{self.about}: {proven}{given}, in {seconds:.2f} s" + (f" ({'; '.join(left_out)})" if left_out else "")
+
+    def _given(self, reasons: Sequence[str]) -> str:
+        """What is taken as given, with the bounds of s if any proof takes these."""
+        bounds = f" and {BOUNDS_OF_S}" if any(BOUNDS_OF_S in reason for reason in reasons) else ""
+        return self.given.replace(_START, _START + bounds)
 
     @property
     def failures(self) -> list[str]:

@@ -24,6 +24,9 @@ from svo.observers.window.evidence import ArrivalSet, SumRows, WindowEvidence, W
 from svo.observers.window.weak_duality import DualSum, NoProof
 from svo.observers.window_kernel import BASE, TIME, Sizes
 
+BOUNDS_OF_S = "the bounds of s of its channels"
+"""What a proof takes as given besides, in words."""
+
 _BITS = 53  # of a float
 _MOST_WORK = 1.5e9  # products of bits: a second; windows of 200 samples of an aircraft take a tenth of it
 
@@ -54,8 +57,14 @@ class WindowCertificate(WindowEvidence, Certificate):
         return replace(self, largest_at=largest_at)
 
     def premise(self, sample: int) -> str:
-        known = "the readings of its window alone" if self.arrival.is_unknown else "the arrival set"
+        known, alone = ("the readings of its window", " alone") if self.arrival.is_unknown else ("the arrival set", "")
+        known += f" and {BOUNDS_OF_S}" if self._takes_bounds_of_s() else alone
         return known + started_again(self.largest_at, self.last, sample)
+
+    def _takes_bounds_of_s(self) -> bool:
+        """Whether bounds of s are taken as given: where they are known from the input they are checked."""
+        of = self.samples if self.late else self.samples[:-1]
+        return bool(self.owner.size) and any(_depends_on_x_or_w(s, self.n) for s in of)
 
     def model_data(self) -> tuple[ModelSample, ...]:
         """w of the last sample is no part of a window unless it enters the output there."""
@@ -113,6 +122,12 @@ class OnWindow(Certificate):
 
     def difference(self, last: int, log: Log) -> str | None:
         return self.about().difference(last, log)
+
+
+def _depends_on_x_or_w(s: WindowSample, n: int) -> bool:
+    """Whether the s of a channel does; without factors, whether an uncertainty is of anything else than the input."""
+    of = s.stack[1:] if s.functional is None else s.functional
+    return bool(of[..., :n].any() or of[..., n + s.u.size + 1 :].any())
 
 
 def _with_known_start(c: WindowCertificate) -> Iterator[WindowCertificate]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,13 @@ import numpy as np
 import pytest
 from stored_alarms import with_digest
 
-from svo import detect, find_plant, read_log
+from polytopes import HPolytope
+from svo import UncertainModel, Uncertainty, WindowObserver, detect, find_plant, read_log, verify
 from svo.detection.chains import PlantModels
-from svo.isolation.alarms import alarm_line, verify_alarms
+from svo.isolation.alarms import Alarm, alarm_line, verify_alarms
+from svo.logs.log import Log
+from svo.observers.window.certificate import WindowCertificate
+from svo.observers.window.evidence import ArrivalSet
 from tests.fuzz import records
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
@@ -166,6 +171,48 @@ def test_what_no_linearisation_chooses_is_the_nonlinear_plants_own(
         (check,) = verify_alarms(path, log, PlantModels(plant, log).difference)
         assert not check.ok
         assert reason in check.reason
+
+
+@pytest.mark.parametrize("stated", [None, "jitter"])
+def test_what_is_not_checked_of_a_nonlinear_model_is_said_whatever_its_source_says(
+    tmp_path: Path, cart: tuple[Any, Any, list[str]], tanks: tuple[Any, Any, list[str]], stated: str | None
+) -> None:
+    path = tmp_path / "alarms.jsonl"
+    for (plant, log, lines), kind in ((tanks, "nonlinear"), (cart, None)):
+        record = json.loads(lines[0])
+        assert record["source"].pop("model", None) == kind
+        if stated == kind:
+            continue
+        record["source"] |= {} if stated is None else {"model": stated}
+        path.write_text(with_digest(record))
+        (check,) = verify_alarms(path, log, PlantModels(plant, log).difference)
+        assert not check.ok
+        assert f"source says 'model': {stated!r}; expected {kind!r}" in check.reason
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_bounds_of_s_that_are_taken_as_given_are_named(tmp_path: Path, is_known: bool) -> None:
+    """x0 in [-1, 1], x1 = x0 + w + Delta x0 / 2 explains y1 = 1.7 of noise 0.2, but not with s = 0."""
+    model = UncertainModel(
+        [[1.0]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.2], Ts=1.0, uncertainties=[Uncertainty(A=[[0.5]])]
+    )
+    observer = WindowObserver(model, HPolytope.box([-1.0], [1.0]))
+    proof = observer.run(Log(np.arange(2.0), np.zeros((2, 0)), np.array([[0.9], [5.0]]))).certificate
+    assert isinstance(proof, WindowCertificate)
+    zeros = {"s_lower": 1, "s_upper": 1, "lines": (1, 4), "on_channel": (1, 2)}
+    nothing = {name: np.zeros(shape) for name, shape in zeros.items()}
+    samples = [replace(s, **nothing, y=np.array([y])) for s, y in zip(proof.samples, (0.9, 1.7), strict=True)]
+    if not is_known:
+        samples = [replace(s, on_output=np.array([m])) for s, m in zip(samples, (1.0, -1.0), strict=True)]
+        proof = replace(proof, arrival=ArrivalSet.unknown(1), on_arrival=np.zeros(0))
+    log = Log(np.arange(2.0), np.zeros((2, 0)), np.array([s.y for s in samples]))
+    forged = Alarm("nominal", 1, 1.0, replace(proof, samples=tuple(samples)), {"plant": "made"})
+    (path := tmp_path / "alarms.jsonl").write_text(alarm_line(forged))
+    (check,) = verify_alarms(path, log)
+    known = "the arrival set" if is_known else "the readings of its window"
+    assert check.reason == f"proven given {known} and the bounds of s of its channels, data as in the log"
+    given = "given the set at the start of each window and the bounds of s of its channels, and that the model in"
+    assert given in verify(path).summary
 
 
 def test_the_record_of_one_model_is_no_alarm_of_another(tmp_path: Path, cart: tuple[Any, Any, list[str]]) -> None:
