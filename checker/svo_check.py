@@ -17,7 +17,7 @@ import math
 import re
 import sys
 import time
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 FLOAT = re.compile(r"(?:-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf)")
@@ -88,9 +88,8 @@ def real(text):
 
 def array(record, *shape):  # a nested list of floats; a None in the shape is any length
     found, words = record["shape"], record["hex"]
-    expect(len(record) == 2 and isinstance(found, list) and len(found) == len(shape), "expected an array")
-    fits = (type(n) is int and n >= 0 and want in (None, n) for n, want in zip(found, shape, strict=True))
-    expect(all(fits), f"an array has shape {str(found)[:80]}; expected {list(shape)}")
+    fits = (type(n) is int and n >= 0 and want in (None, n) for n, want in zip_longest(found, shape, fillvalue=""))
+    expect(len(record) == 2 and all(fits), f"an array has shape {str(found)[:80]}; expected {list(shape)}")
     expect(FLOATS.fullmatch(words), f"expected floats in hexadecimal, found {words[:40]!r}")
     values = [*map(float.fromhex, words.split(" "))] if words else []
     expect(math.prod(found) == len(values) and found[0] <= max(len(values), 1 << 16), "an array has other entries")
@@ -239,7 +238,6 @@ class Model:  # an observer's: the numbers of plant.json alone, never those of a
 
     def _at(self, k):  # linear interpolation, five operations in doubles; the nearest end beyond the points
         points, s = self._points, self._schedule[k]
-        expect(math.isfinite(s), "a scheduling value is not finite")
         if s <= points[0] or s >= points[-1]:
             return self._stacks[0 if s <= points[0] else -1]
         i = max(j for j in range(len(points)) if points[j] <= s)
@@ -313,8 +311,7 @@ class Chain:  # what follows, step by step, about one observer's model
         functional = array(step["functional"], len(owner), model.columns)
         self._choose(k, owner, gain, functional)
 
-    def _choose(self, k, owner=(), gain=(), functional=()):
-        """Factors, if any, and max |Delta| |stack - sum gain functional'|, by entries, rounded up, where not zero."""
+    def _choose(self, k, owner=(), gain=(), functional=()):  # and what they leave out, by entries, rounded up
         found = {}
         for item, ends in enumerate(self.model.delta, start=1):
             for i, row in enumerate(self.model.stack(k)[0][item]):
@@ -357,9 +354,7 @@ class Chain:  # what follows, step by step, about one observer's model
             for w, row in zip(weight.m, rows, strict=True):
                 if w:
                     sums = [s + w * r for s, r in zip(sums, row, strict=True)]
-            g = Vec(sums, weight.e + e) + more[model.rows :]
-            if at == k:
-                g -= objective
+            g = Vec(sums, weight.e + e) + more[model.rows :] - (objective if at == k else Vec([0] * model.columns))
             owner, gain, functional, rest, _ = self.channels.get(k) or self._choose(k)
             for q in range(len(owner)):
                 on_p = Set([gain[q]] * 2).least(weight)
@@ -383,8 +378,7 @@ class Chain:  # what follows, step by step, about one observer's model
         expect(not lines, "a line is of a channel that there is not")
         return total + known.least(costate, array(step["on_start"], len(known.rows)))
 
-    def _sums(self, step, first, last):
-        """Rows that are sums: what their bounds come to, and by sample their multipliers of outputs, then of z."""
+    def _sums(self, step, first, last):  # what bounds of sums come to; by sample multipliers of rows, then of z
         total, found, model = num(0.0), {}, self.model
         for (row, end), (m,) in stated(step, "on_sum", "sum", 1):
             column, length, *ends = model.sums[count(row)]
@@ -431,34 +425,38 @@ def largest(low, high):
     return [max(abs(a), abs(b)) for a, b in zip(low, high, strict=True)]
 
 
-def linearised(*of):  # by the file beside this one
-    sys.modules.setdefault("svo_check", sys.modules[__name__])
-    sys.path.append(str(Path(__file__).parent))
-    return __import__("svo_check_nonlinear").Linearised(*of)
+def chain_of(plant, observer, log, sample):  # of a nonlinear model by the file beside this one
+    try:
+        record = plant["observers"][observer]
+        if "equations" not in record:
+            return Chain(Model(record), log, sample)
+        sys.modules.setdefault("svo_check", sys.modules[__name__])
+        sys.path.append(str(Path(__file__).parent))
+        return __import__("svo_check_nonlinear").Linearised(record, plant, log, sample)
+    except REFUSALS as error:
+        raise Wrong(f"the model {observer!r:.60} of the model file: {said(error)}") from error
 
 
 def check(proof, plant, log):  # observer, sample and chain of every alarm of a proof
-    steps = map(parsed, lines_of(proof))
-    head, chain, done = next(steps, {}), None, []
+    lines, chain, done = lines_of(proof), None, []
     wanted = {"format": "svo-proof-1", "plant": plant["plant"], "noise": plant["noise"]}
-    expect(wanted.items() <= head.items(), f"the proof is not of {wanted}")
-    for step in steps:
-        if step["step"] == "chain":
-            expect(chain is None, "a chain ends without its alarm")
-            observer, sample = step["observer"], count(step["sample"], 0, len(log.time))
-            expect(log.time[sample] == real(step["time"]), "a chain's time is not its sample's")
-            try:
-                record = plant["observers"][observer]
-                is_linear = "equations" not in record
-                chain = Chain(Model(record), log, sample) if is_linear else linearised(record, plant, log, sample)
-            except REFUSALS as error:
-                raise Wrong(f"the model {observer!r:.60} of the model file: {said(error)}") from error
-            continue
-        expect(chain is not None, "a step stands in no chain")
-        chain.take(step)
-        if step["step"] == "alarm":
-            done.append((observer, chain.claimed, chain))
-            chain = None
+    for number, line in enumerate(lines, start=1):
+        try:
+            step = parsed(line)
+            if number == 1:
+                expect(wanted.items() <= step.items(), f"the proof is not of {wanted}")
+            elif step["step"] == "chain":
+                expect(chain is None, "a chain ends without its alarm")
+                observer, sample = step["observer"], count(step["sample"], 0, len(log.time))
+                expect(log.time[sample] == real(step["time"]), "a chain's time is not its sample's")
+                chain = chain_of(plant, observer, log, sample)
+            else:
+                expect(chain is not None, "a step stands in no chain")
+                chain.take(step)
+                if step["step"] == "alarm":
+                    done, chain = [*done, (observer, sample, chain)], None
+        except REFUSALS as error:
+            raise Wrong(f"line {number}: {said(error)}") from error
     expect(chain is None and done, "the proof has no alarm, or a chain without one")
     return done
 
@@ -472,6 +470,7 @@ def main():
     for name in ("proof", "--model", "--log"):
         parser.add_argument(name, **{"required": True} if name[0] == "-" else {})
     given, begun = parser.parse_args(), time.process_time()
+    sys.stdout.reconfigure(errors="backslashreplace")
     try:
         plant = parsed(Path(at := given.model).read_bytes())
         expect(plant.get("format") == "svo-plant-1", "the model is not of the format svo-plant-1")
@@ -479,7 +478,8 @@ def main():
         expect(plant["samples"] is None or count(plant["samples"]) == len(log.time), "the model is of another log")
         found = check(at := given.proof, plant, log)
         intervals = array(plant["intervals"], len(log.time) - 1) if "intervals" in plant else None
-        log.check_times(max(sample for _, sample, _ in found), real(plant["Ts"]), intervals)
+        last, at = max(sample for _, sample, _ in found), given.log
+        log.check_times(last, real(plant["Ts"]), intervals)
     except REFUSALS as error:
         print(f"NOT PROVEN: {at}: {said(error):.250}")
         return 1
@@ -488,7 +488,7 @@ def main():
         for premise in chain.premises:
             print(f"    given that {premise}")
     for what, path in (("the models and bounds", given.model), ("the readings", given.log)):
-        print(f"given {what} of {path} (sha256 {hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]}...)")
+        print(f"given {what} of {path} (sha256 {hashlib.sha256(Path(path).read_bytes()).hexdigest()})")
     print("where a decimal means the nearest double; that w and Delta are held from sample to sample, unless the")
     print("model says that they vary, and that faults begin at samples, which are as far apart as the model says")
     print(f"{len(found)} of {len(found)} alarms proven, in {time.process_time() - begun:.1f} s CPU")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated
 
@@ -106,8 +107,11 @@ def describe(
     found = with_bank(face.find_plant(plant), BankChoice(architecture, models))
     data = None if log is None else face.read_log(log, found)
     record = plant_record(found, chosen_noise(found, noise), data)
-    write_text(out, json_text(record) + "\n")
+    text = json_text(record) + "\n"
+    write_text(out, text)
+    digest = sha256(text.encode()).hexdigest()  # which checkers print with their verdict
     if as_json:
-        print_json({"file": str(out), "noise": record["noise"], "observers": list(record["observers"])})
+        names = list(record["observers"])
+        print_json({"file": str(out), "noise": record["noise"], "observers": names, "sha256": digest})
     else:
-        say(f"Models of {', '.join(record['observers'])} with their bounds: {out}")
+        say(f"Models of {', '.join(record['observers'])} with their bounds: {out} (sha256 {digest})")

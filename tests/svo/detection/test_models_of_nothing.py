@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from checkers import CHECK
+from checkers import CHECK, NONLINEAR
 from proof_cases import Files, Made, proven, random_plant, steps_of, tiny, with_steps
 
 from svo import UncertainModel
@@ -196,9 +196,9 @@ def test_equations_that_hold_nowhere_are_refused(equations: Record, further: Rec
     if "first" in further:
         none = {"rows": {"shape": [0, 2], "hex": ""}, "lower": array(), "upper": array()}
         further = further | {"first": {"box_lower": array(0.0, 0.0), "box_upper": array(0.5, 0.5)} | none}
-    CHECK.linearised(record, plant, None, 0)
+    NONLINEAR.Linearised(record, plant, None, 0)
     with pytest.raises(CHECK.REFUSALS, match=r"nothing is within|not enough values|finite|is not in list"):
-        CHECK.linearised(record | further | {"equations": record["equations"] | equations}, plant, None, 0)
+        NONLINEAR.Linearised(record | further | {"equations": record["equations"] | equations}, plant, None, 0)
 
 
 def test_what_is_described_leaves_a_point() -> None:

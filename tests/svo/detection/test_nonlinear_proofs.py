@@ -251,7 +251,7 @@ def test_what_varies_counts_once(reactor: Files) -> None:
     record, bounds = plant["observers"]["nominal"], []
     for varying in ([0], [0, 0]):
         record["equations"]["varying"] = varying
-        model = CHECK.linearised(record, plant, CHECK.Log(reactor[2], plant["columns"]), 0).model
+        model = NONLINEAR.Linearised(record, plant, CHECK.Log(reactor[2], plant["columns"]), 0).model
         bounds.append([*model.output([(0, 1), (NONLINEAR.ONE, 400 * NONLINEAR.ONE)], [300.0])])
         assert [*model.varies] == [0]
     assert bounds[0] == bounds[1]
@@ -279,7 +279,7 @@ def is_checked(found: ProvenChain, observer: WindowObserver, log: Log, at: int, 
     assert first is not None
     told = SimpleNamespace(u=log.u.tolist(), y=log.y.tolist(), time=log.time.tolist())
     record = observer_record("made", first, observer.model, None)
-    chain = CHECK.linearised(record, {"Ts": float(observer.model.Ts).hex(), **plant}, told, at)
+    chain = NONLINEAR.Linearised(record, {"Ts": float(observer.model.Ts).hex(), **plant}, told, at)
     try:
         for step in found.steps:
             chain.take(json.loads(json.dumps(step)))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import gzip
+import hashlib
 import json
+import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -90,9 +92,13 @@ def test_the_commands_write_what_the_checker_takes(tmp_path: Path) -> None:
     proof, plant = tmp_path / "proof.jsonl.gz", tmp_path / "plant.json"
     assert run("detect", CART, log, "--out", out).exit_code == 0
     assert run("verify", out / "alarms.jsonl", "--full", log, "--write-proof", proof).exit_code == 0
-    assert run("describe", CART, "--out", plant).exit_code == 0
+    told = run("describe", CART, "--out", plant)
     code, text = answer(proof, plant, log)
-    assert code == 0
+    assert (told.exit_code, code) == (0, 0)
+    digest, of_log = (hashlib.sha256(path.read_bytes()).hexdigest() for path in (plant, log))
+    assert f"(sha256 {digest})" in " ".join(told.output.split())
+    assert f"{plant} (sha256 {digest})" in text
+    assert f"{log} (sha256 {of_log})" in text
     assert "2 of 2 alarms proven" in text
     written = proof.read_bytes()
     again = run("verify", out / "alarms.jsonl", "--full", log, "--write-proof", proof)
@@ -180,6 +186,32 @@ def test_a_file_that_is_another_is_named(case: tuple[Files, int], tmp_path: Path
         assert text.startswith("NOT PROVEN: ")
         assert str(word) in text
         assert len(text.splitlines()) == 1
+
+
+@pytest.mark.parametrize("at", [1, 2, 5, -1])
+def test_the_first_line_that_does_not_follow_is_named(case: tuple[Files, int], at: int, tmp_path: Path) -> None:
+    steps = steps_of(case[0][0])
+    line = range(1, len(steps) + 1)[at - 1 if at > 0 else at]
+    plant = json.loads(case[0][1].read_text())
+    log = CHECK.Log(case[0][2], plant["columns"])
+    for change in (b"{", b"[]", b'"\xe9"', b'{"step": "trust me", "sample": 0}', b'{"a": 1, "a": 2}'):
+        lines = [json.dumps(step).encode() for step in steps]
+        lines[line - 1] = change
+        (path := tmp_path / "changed").write_bytes(b"\n".join(lines) + b"\n")
+        with pytest.raises(CHECK.Wrong, match=f"^line {line}: "):
+            CHECK.check(path, plant, log)
+    code, text = answer(path, *case[0][1:])
+    assert (code, text) == (1, f"NOT PROVEN: {path}: line {line}: an entry stands twice in an object\n")
+
+
+def test_names_that_a_terminal_cannot_say_are_no_reason_to_fail(case: tuple[Files, int], tmp_path: Path) -> None:
+    (name := tmp_path / "\u03b4.csv").write_bytes(case[0][2].read_bytes())
+    command = [sys.executable, "-I", "-X", "utf8=0", str(FOLDER / "svo_check.py"), str(case[0][0]), "--model"]
+    done = subprocess.run(
+        [*command, str(case[0][1]), "--log", str(name)], capture_output=True, check=False, env={"LC_ALL": "C"}
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"1 of 1 alarms proven" in done.stdout
 
 
 # -- what is refused --------------------------------------------------------------------------------------------------
