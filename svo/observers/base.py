@@ -1,4 +1,7 @@
-"""What an observer is; its answers are in `svo.observers.answers`, its proofs in `svo.observers.certificate`.
+"""What an observer is.
+
+Its answers are in `svo.observers.answers`, its proofs in `svo.observers.certificate`, what it may do besides in
+`svo.observers.capabilities`.
 
 Public methods are checked and described here, once; an observer fills in the hooks behind them, which begin with an
 underscore and are given what has been checked.
@@ -7,11 +10,11 @@ underscore and are given what has been checked.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +30,7 @@ from svo.models import Labels, UncertainModel, expect_model
 from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.answers import Seen, Step, VerdictName
+from svo.observers.capabilities import Capabilities
 from svo.observers.certificate import Certificate
 from svo.observers.data import (
     check_may_start_by_step,
@@ -46,10 +50,10 @@ __all__ = ["Certificate", "Observer", "Record", "Seen", "Step", "VerdictName"]
 _UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, RecursionError)  # by arrays that fit no observer
 
 
-class Observer(Shown, ABC):
+class Observer(Shown, Capabilities, ABC):
     """The set of states that a model and the data so far allow, sample by sample.
 
-    A kind of its own defines `_reset`, `_update` and `_step`, and the hooks of what else it declares that it can do.
+    A kind of its own defines `_reset`, `_update` and `_step`, and what it declares of `Capabilities`.
     Hooks answer with a new step each time. They get arrays of the right shapes: finite numbers, NaN in a measurement
     where a sensor is missing, zeros for an input that is not needed. One that raises an error leaves the observer as it
     was. `_number` is the number of the sample that a hook is asked about, or of the newest one. After a falsification
@@ -61,36 +65,11 @@ class Observer(Shown, ABC):
 
     Attributes
     ----------
-    kind : str
-        Name of the kind, in `options` and messages.
-    takes_deadline : bool
-        Whether `step` can stop at a deadline.
-    takes_late : bool
-        Whether `late_update` takes measurements that come late: `_oldest`, `_read_at` and `_late_update` are defined.
-    saves_state : bool
-        Whether it can be saved and go on: `_options`, `_state`, `_set_up` and `_resume` are defined.
-    starts_without_set : bool
-        Whether it can start with nothing known of the state: `_lose_set` is defined.
-    takes_intervals : bool
-        Whether a transition may take another time than the sampling time: `_set_interval` is defined.
-    takes_jitter : bool
-        Whether its model may have sensors whose time stamps are off.
-    takes_nonlinear : bool
-        Whether its model may be a `NonlinearModel`.
     largest_at : int or None
         Sample at which the set last started from the model's largest set, if what is known now rests on it.
     first_set : ArrivalSet or None
         Of the state at its first sample, as it was given; a proof of its whole chain needs it.
     """
-
-    kind: ClassVar[str] = "own"
-    takes_deadline: ClassVar[bool] = False
-    takes_late: ClassVar[bool] = False
-    saves_state: ClassVar[bool] = False
-    starts_without_set: ClassVar[bool] = False
-    takes_intervals: ClassVar[bool] = False
-    takes_jitter: ClassVar[bool] = False
-    takes_nonlinear: ClassVar[bool] = False
 
     model: UncertainModel
     largest_at: int | None = None
@@ -433,48 +412,6 @@ class Observer(Shown, ABC):
     def _warm_up(self) -> None:
         """As `warm_up`; nothing, unless something is loaded late."""
 
-    # -- hooks of what some can do -----------------------------------------------------------------------
-
-    @property
-    def _oldest(self) -> int:
-        """First sample of `window`."""
-        raise NotImplementedError
-
-    def _read_at(self, sample: int) -> Array:
-        """What was read at a sample of the window; NaN where a sensor is missing."""
-        raise NotImplementedError
-
-    def _late_update(self, y: Array, sample: int) -> Step:
-        """A late measurement of a sample of the window; the answer is about the newest sample."""
-        raise NotImplementedError
-
-    def _check_interval(self, dt: float) -> None:
-        """Refuse seconds that a transition cannot take, before anything is taken."""
-
-    def _set_interval(self, dt: float | None) -> None:
-        """The next transition takes ``dt`` seconds; None: the model's ``Ts``."""
-        raise NotImplementedError
-
-    def _lose_set(self) -> None:
-        """Start with nothing known but the model's ranges."""
-        raise NotImplementedError
-
-    def _options(self) -> Mapping[str, Any]:
-        """The options besides the kind."""
-        return {}
-
-    def _state(self) -> dict[str, NDArray[Any]]:
-        """The arrays of a saved state."""
-        raise NotImplementedError
-
-    def _set_up(self, model: UncertainModel, state: State) -> None:
-        """Take model and options from a state, as the constructor does from its arguments."""
-        raise NotImplementedError
-
-    def _resume(self, state: State) -> Step | None:
-        """Take the rest, `_number` too; the answer of a falsification, proven again, if there was one."""
-        raise NotImplementedError
-
     # -- inside ------------------------------------------------------------------------------------
 
     def _forget(self) -> None:
@@ -529,7 +466,3 @@ class Observer(Shown, ABC):
             if read.any():
                 raise ValueError(f"y has a value of sensor {int(np.argmax(read))}, which was already read at {sample}")
         return outputs
-
-    def _check_can(self, able: bool, why_not: str) -> None:
-        if not able:
-            raise TypeError(f"{type(self).__name__} {why_not}")
