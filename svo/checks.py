@@ -86,9 +86,9 @@ def finite_array(name: str, value: Any, *shapes: Shape, meaning: str = "") -> Ar
     return array
 
 
-def readings(name: str, value: Any, *shapes: Shape, meaning: str = "") -> Array:
+def readings(name: str, value: Any, *shapes: Shape) -> Array:
     """Numbers of which some may be missing (NaN, masked, None): NaN there, and no infinity."""
-    return real_array(name, value, *shapes, meaning=meaning, missing=True)
+    return real_array(name, value, *shapes, missing=True)
 
 
 def floats(name: str, value: Any, *, missing: bool = False) -> Array:

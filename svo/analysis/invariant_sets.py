@@ -100,17 +100,30 @@ def largest_invariant_set(
 ) -> InvariantSet:
     """The largest set in a constraint that the system does not leave, for all w (and for some u, where it has inputs).
 
-    Every iterate contains it; the last one is proved invariant where the search ends.  Where that leaves no proof, the
-    search goes on from there with new rows moved inward by 1e-11 of their terms, then 1e-9 and 1e-7: the set is then
-    invariant, smaller than the largest by some such parts, and the reason names them.
+    ``O_0`` is the constraint, ``O_k+1`` is what `predecessor` leaves of ``O_k`` (Gilbert and Tan 1991, Kolmanovsky and
+    Gilbert 1998). Every iterate contains the set; the last one is proved invariant where the search ends.  Where that
+    leaves no proof, the search goes on from there with new rows moved inward by 1e-11 of their terms, then 1e-9 and
+    1e-7: the set is then invariant, smaller than the largest by some such parts, and the reason names them.
 
     Parameters
     ----------
     constraint : HPolytope
+        In R^n.
     system : LinearSystem or UncertainModel
     inputs : HPolytope, optional
-        The set of u, where a model is given that has inputs.
+        As of `predecessor`.
     max_steps : int
+        Most iterates, at least 1.
+
+    Returns
+    -------
+    InvariantSet
+        "undecided" where the search has not ended by then.
+
+    Raises
+    ------
+    TypeError, ValueError, UndecidedError
+        As `predecessor`, and for a limit below 1.
     """
     expect_kind("constraint", constraint, HPolytope, "an HPolytope")
     known, most = system_of(system, inputs), whole_number("max_steps", max_steps, least=1)
@@ -181,6 +194,9 @@ def smallest_invariant_set(
 ) -> InvariantSet:
     """A set that a stable system does not leave, little larger than the smallest one (where all trajectories end).
 
+    The sum of ``A^i W`` for i < s over ``1 - alpha``, where ``A^s W`` is in ``alpha W`` (Rakovic, Kerrigan, Kouramas
+    and Mayne 2005, theorem 1).
+
     Parameters
     ----------
     system : LinearSystem or UncertainModel
@@ -193,6 +209,11 @@ def smallest_invariant_set(
         with it, and names it.
     max_steps : int
         Limit on the number of terms s.
+
+    Returns
+    -------
+    InvariantSet
+        "undecided" where the limit is too low, as it is for every system that is not stable.
 
     Raises
     ------

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,6 +88,11 @@ class LinearSystem:
         model : UncertainModel
         inputs : HPolytope, optional
             The set of u; needed if the model has inputs.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If it is no such model, or the set of inputs is missing or does not fit.
         """
         expect_kind("model", model, UncertainModel, "an UncertainModel")
         fixed = not (model.is_scheduled or model.uncertainties)
@@ -144,32 +148,44 @@ class LinearSystem:
 
 
 def system_of(system: LinearSystem | UncertainModel, inputs: HPolytope | None = None) -> LinearSystem:
-    """A system, or that of a model."""
-    return LinearSystem.of(system, inputs) if isinstance(system, UncertainModel) else expected(system)
-
-
-def expected(system: Any) -> LinearSystem:
-    """The system itself; TypeError if it is none."""
+    """A system, or that of a model with a set of inputs; ValueError if a system is given another one."""
+    if isinstance(system, UncertainModel):
+        return LinearSystem.of(system, inputs)
     expect_kind("system", system, LinearSystem, "a LinearSystem or an UncertainModel")
-    found: LinearSystem = system
-    return found
+    expect(inputs is None, "inputs", inputs, "None: a LinearSystem has the set of its inputs already")
+    return system
 
 
 @options_by_name
 def predecessor(
     target: HPolytope, system: LinearSystem | UncertainModel, *, inputs: HPolytope | None = None
 ) -> HPolytope:
-    """``{x : there is u in U with A x + B u + a + E w in the target for all w in W}``, exact or outward.
+    """The states from which some input leads into a target whatever the disturbance is.
 
-    The Pontryagin difference of the target and ``E W``, pulled back, and projected on x where there are inputs; there
-    floats tell the normals, and the sides are supports of all ``(x, u, x+)``, rounded up.
+    ``{x : there is u in U with A x + B u + a + E w in the target for all w in W}``: the Pontryagin difference of the
+    target and ``E W``, pulled back, and projected on x where there are inputs (Blanchini and Miani 2015, chapter 5).
 
     Parameters
     ----------
     target : HPolytope
+        In R^n.
     system : LinearSystem or UncertainModel
     inputs : HPolytope, optional
-        The set of u, where a model is given that has inputs.
+        The set U of u in R^nu, where a model is given that has inputs; a `LinearSystem` has its own.
+
+    Returns
+    -------
+    HPolytope
+        In R^n; exact where all numbers are short (`LinearSystem.is_short`), else it contains the exact set: floats tell
+        the normals, and the sides are rounded up.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the target is of another dimension than the states, or a model has uncertainties or a schedule, or inputs
+        and no set of them.
+    UndecidedError
+        If a linear program cannot be decided.
     """
     known = system_of(system, inputs)
     expect(target.dim == known.n_states, "target", target, f"a set in R^{known.n_states}")
@@ -205,16 +221,33 @@ def whatever_comes(target: HPolytope, system: LinearSystem) -> HPolytope:
 
 @options_by_name
 def successor(start: HPolytope, system: LinearSystem | UncertainModel, *, inputs: HPolytope | None = None) -> HPolytope:
-    """``{A x + B u + a + E w : x in start, u in U, w in W}``: what some input and some disturbance reach; or outward.
+    """The states that some input and some disturbance reach from a set: ``{A x + B u + a + E w : x in start}``.
+
+    Images and Minkowski sums.
 
     Parameters
     ----------
     start : HPolytope
+        In R^n.
     system : LinearSystem or UncertainModel
     inputs : HPolytope, optional
-        The set of u, where a model is given that has inputs.
+        The set U of u in R^nu, where a model is given that has inputs; a `LinearSystem` has its own.
+
+    Returns
+    -------
+    HPolytope
+        In R^n; exact where all numbers are short (`LinearSystem.is_short`), else it contains the exact set.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the set is of another dimension than the states, or a model has uncertainties or a schedule, or inputs
+        and no set of them.
+    UndecidedError
+        If a linear program cannot be decided.
     """
     known = system_of(system, inputs)
+    expect(start.dim == known.n_states, "start", start, f"a set in R^{known.n_states}")
     reached = start.affine_map(known.A, known.a)
     for block, values in ((known.B, known.inputs), (known.E, known.disturbances)):
         if values is not None:

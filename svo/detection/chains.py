@@ -1,4 +1,4 @@
-"""Proofs of alarms from the first sample of their log on (``svo verify --full``), by the observers of their plant."""
+"""Proofs of alarms from the models of their plant and the log alone (``svo verify --full``)."""
 
 from __future__ import annotations
 
@@ -214,9 +214,6 @@ def _with_chain(
     return replace(check, ok=found is not None, reason=reason, seconds=check.seconds + perf_counter() - begun)
 
 
-_NOT_FROM_THE_FIRST = "bounds of {} are not proven from the first sample on; verify without --full"
-
-
 def _prove(models: PlantModels, alarm: Alarm) -> tuple[ProvenChain | None, str]:
     """The proof of an alarm, and in words what it is or why there is none."""
     bank, log = models.bank(alarm), models.log(alarm)
@@ -225,7 +222,7 @@ def _prove(models: PlantModels, alarm: Alarm) -> tuple[ProvenChain | None, str]:
     if first is None:
         return None, f"the observer {alarm.observer!r} ({type(observer).__name__}) does not say its first_set"
     if observer.jitter is not None:
-        return None, _NOT_FROM_THE_FIRST.format("a model with jitter")
+        return None, "bounds of a model with jitter are not proven; verify without --full"
     begun = _beginning(bank, alarm, log, first)
     if begun is None:
         where = f"at sample {alarm.sample}"

@@ -94,7 +94,7 @@ def detect_streamed(
     ----------
     plant : MonitoredPlant
     log : LongLog
-        As `svo.plant.log_file.survey_log` gives it for this plant.
+        As `svo.plant.long_log.survey_log` gives it for this plant.
     noise : str, optional
         Noise set whose bounds the observers assume; by default the plant's first.
     progress : callable, optional

@@ -124,11 +124,6 @@ class WindowObserver(Observer):
         return self._sampler.needs_next_input
 
     @property
-    def free_since(self) -> int | None:
-        """Sample from which on the readings alone bound the state, if the set last started again from them."""
-        return self._window.origin if self._window.free else None
-
-    @property
     def linearised(self) -> tuple[Linearisation | None, Linearisation | None]:
         """Of a nonlinear model: the linear models of the sample before the newest one, with the transition from it,
         and of the newest one, which has none yet; None before there are such samples."""

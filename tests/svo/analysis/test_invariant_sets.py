@@ -151,6 +151,23 @@ def test_the_page_runs() -> None:
     assert names["least"].verify()
 
 
+def test_a_model_with_inputs_takes_the_set_of_them() -> None:
+    A, B, E = [[1.0, 1.0], [0.0, 1.0]], [[0.5], [1.0]], [[0.0], [1.0]]
+    U, W, X = interval(1.0), interval(0.125), cube(2, 2.0)
+    pushed = UncertainModel(A, B, np.eye(2), E=E, w=[0.125], n=0.1)
+    system = LinearSystem(A, B, E=E, inputs=U, disturbances=W)
+    assert predecessor(X, pushed, inputs=U) == predecessor(X, system) != X
+    assert successor(X, pushed, inputs=U) == successor(X, system)
+    found, same = largest_invariant_set(X, pushed, inputs=U, max_steps=3), largest_invariant_set(X, system, max_steps=3)
+    assert (found.status, found.set == same.set) == (same.status, True)
+    with pytest.raises(ValueError, match=r"R\^1, the columns of B"):
+        predecessor(X, pushed)
+    with pytest.raises(ValueError, match="a LinearSystem has the set of its inputs already"):
+        predecessor(X, system, inputs=U)
+    with pytest.raises(ValueError, match=r"expected a set in R\^2"):
+        successor(interval(1.0), system)
+
+
 def test_wrong_systems_are_refused() -> None:
     with pytest.raises(ValueError, match="expected a square matrix"):
         LinearSystem([[1.0, 2.0]])
