@@ -22,10 +22,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._forged_cases import TARGETS
+from benchmarks._forged_alarms import Full, Plain, WithLog
+from benchmarks._forged_proofs import Checked
 
 BATCH, SEED = 100, 20_261_129
 Judge = Callable[[np.random.Generator, Path], tuple[str, str]]
+TARGETS: dict[str, Callable[[], Judge]] = {"plain": Plain, "log": WithLog, "full": Full, "checker": Checked}
 
 
 def judged(judge: Judge, edits: range, seed: int) -> dict[str, Any]:

@@ -10,8 +10,9 @@ import pytest
 from checkers import CHECK
 from proof_cases import proven, steps_of, tiny
 
+from benchmarks._claims import of_plant, of_window, one_reading, set_of
 from benchmarks._exact_witness import Instant, Start, witness
-from benchmarks._forged_cases import Checked, of_plant, of_window, one_reading, set_of
+from benchmarks._forged_proofs import Checked
 from benchmarks.forgery import judged, run
 from polytopes import HPolytope
 from svo import UncertainModel, WindowObserver
