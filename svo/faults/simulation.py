@@ -39,6 +39,7 @@ def simulate_fault(
     acting : fault of `svo.faults`, or a pair
         Its times are those from the run's first sample, which is at 0 s.
     x0 : (n,) array
+        Or only the states of f: parameters that are constant are then drawn.
     u : (K, nu) array
         What is commanded, one row a sample: the log has it, and the plant what a faulty actuator makes of it.
     rng, corners, substeps
@@ -47,7 +48,7 @@ def simulate_fault(
     Returns
     -------
     Log
-        With the true states.
+        With the true states of ``model``; a constant parameter is one until the fault moves it.
 
     Raises
     ------
@@ -60,6 +61,7 @@ def simulate_fault(
     expect_kind("rng", rng, np.random.Generator, "a numpy Generator, such as np.random.default_rng(0)")
     time = np.arange(len(commands)) * model.Ts
     faults = acting.members if isinstance(acting, FaultPair) else (acting,)
+    first = dict(zip(model.flow.states, model.first_state(x0, rng, corners=corners).tolist(), strict=True))
     plant, sizes = model, dict[str, Array]()
     for one in faults:
         if isinstance(one, ParameterFault | PlantFault):
@@ -68,17 +70,19 @@ def simulate_fault(
             name = one.parameter if isinstance(one, ParameterFault) else tuple(plant.parameters)[-1]
             healthy = sizes.get(name)
             if healthy is None:
-                ends = np.full(len(time), low), np.full(len(time), high)
-                healthy = draw(*ends, rng, corners)
+                lower, upper = (np.full(len(time), first.get(name, end)) for end in (low, high))
+                healthy = draw(lower, upper, rng, corners)
             sizes[name] = healthy + one.delta(time)
     achieved = commands
     for one in faults:
         achieved = one.corrupt(time, achieved) if isinstance(one, ActuatorFault) else achieved
-    log = plant.simulate(x0, achieved, rng, corners=corners, substeps=substeps, parameters=sizes)
-    y = log.y
+    begun = [first[name] for name in plant.flow.states]
+    log = plant.simulate(begun, achieved, rng, corners=corners, substeps=substeps, parameters=sizes)
+    assert log.x is not None
+    y, known = log.y, sizes | dict(zip(plant.flow.states, log.x.T, strict=True))
     for one in faults:
         y = one.corrupt(time, y) if isinstance(one, SensorFault) else y
-    return replace(log, u=commands, y=y)
+    return replace(log, u=commands, y=y, x=np.column_stack([known[name] for name in model.flow.states]))
 
 
 _KINDS = (ActuatorFault, ParameterFault, PlantFault, SensorFault)

@@ -12,7 +12,7 @@ from svo.isolation.logic import GLOBAL, StateName
 from svo.isolation.record import BankRecord, Replay, Verdict
 from svo.logs.log import Log
 from svo.models import Labels
-from svo.observers.base import Certificate
+from svo.observers.base import Certificate, Step
 
 
 class Change(NamedTuple):
@@ -61,7 +61,7 @@ class Outcome:
             if name in self.names:
                 if step.verdict == "undecided":
                     self.undecided += 1
-                    self.reason = self.reason or _reason(name, step.reason, verdict.sample)
+                    self.reason = self.reason or _reason(name, step, verdict.sample)
                 self.stopped += step.stopped
                 is_dead = name not in verdict.alive
             else:
@@ -74,10 +74,13 @@ class Outcome:
             self.isolated_at, self.fault = verdict.isolated_at, verdict.fault
 
 
-def _reason(name: str, why: str | None, sample: int) -> str | None:
-    """Who is undecided, when and why."""
-    where = "" if why is None or f"at sample {sample}," in why else f" at sample {sample}"
-    return None if why is None else f"{name}{where}, {why}"
+def _reason(name: str, step: Step, sample: int) -> str | None:
+    """Who is undecided, when and why; an observer that started late counts samples of its own."""
+    if step.reason is None:
+        return None
+    when = f"at sample {sample}"
+    why = step.reason.replace(f"at sample {step.sample},", f"{when},")
+    return f"{name}, {why}" if when in why else f"{name} {when}, {why}"
 
 
 class Recorder(Outcome):

@@ -95,11 +95,11 @@ class Flow:
     def outside_valid(self, j: int, lower: float, upper: float) -> Undecided:
         """That state j may be between these bounds."""
         assert self.valid is not None
-        return Undecided(
-            f"{self.states[j]} may be in [{lower:.6g}, {upper:.6g}], outside valid = "
-            f"[{self.valid.lower[j]:.6g}, {self.valid.upper[j]:.6g}]",
-            coordinate=j,
-        )
+        least, most = self.valid.lower[j], self.valid.upper[j]
+        seen = float(f"{lower:.6g}") < least or float(f"{upper:.6g}") > most
+        digits = 6 if seen else 17  # so that the message shows what it says
+        where, inside = (f"[{a:.{digits}g}, {b:.{digits}g}]" for a, b in ((lower, upper), (least, most)))
+        return Undecided(f"{self.states[j]} may be in {where}, outside valid = {inside}", coordinate=j)
 
 
 def joint(x: Span, w: Span, u: Array) -> tuple[Array, Array]:

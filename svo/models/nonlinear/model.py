@@ -369,6 +369,18 @@ class NonlinearModel(Value, Shown):
 
     # -- simulation ------------------------------------------------------------------------------
 
+    def first_state(self, x0: ArrayLike, rng: np.random.Generator, *, corners: bool = False) -> Array:
+        """x0 (n,) as it is; of the states of f alone, with a drawn value of each parameter that is constant.
+
+        Raises
+        ------
+        TypeError, ValueError
+            For a wrong shape, NaN or Inf.
+        """
+        x: Array = finite_array("x0", x0, *dict.fromkeys([(len(self.states),), (self.n_states,)]))
+        lower, upper = (end[len(x) :] for end in (self.start_range.lower, self.start_range.upper))
+        return np.append(x, draw(lower, upper, rng, corners))
+
     @options_by_name
     def simulate(
         self,
@@ -407,14 +419,10 @@ class NonlinearModel(Value, Shown):
             For a wrong shape, NaN or Inf, or if the run leaves the range where the equations have values.
         """
         inputs = finite_array("u", u, ("samples", self.n_inputs))
-        x: Array = finite_array("x0", x0, *dict.fromkeys([(len(self.states),), (self.n_states,)]))
         expect_shape(len(inputs), "u", inputs, f"(samples, {self.n_inputs}), at least one sample")
         expect_kind("rng", rng, np.random.Generator, "a numpy Generator, such as np.random.default_rng(0)")
         expect(is_count(substeps, 1), "substeps", substeps, "a number of steps >= 1")
-        T = self.Ts if self.continuous else None
-        if len(x) < self.n_states:
-            lower, upper = (end[len(x) :] for end in (self.start_range.lower, self.start_range.upper))
-            x = np.append(x, draw(lower, upper, rng, corners))
+        T, x = self.Ts if self.continuous else None, self.first_state(x0, rng, corners=corners)
         given = given_values(self.flow, self.free, parameters or {}, len(inputs))
         return simulated(self.flow, self.reading, self.noise, self.Ts, x, inputs, rng, corners, T, int(substeps), given)
 

@@ -153,17 +153,29 @@ class SimulatedPlant(Shown):
     ) -> Log:
         shape = self._profile(profile)
         if fault.acting is not None:
-            own = x0[: len(plant.states)] if len(x0) > plant.n_states else x0
-            return simulate_fault(plant, replace(fault.acting, profile=shape), own, u, rng, substeps=_SUBSTEPS)
-        model: Any = fault.model
-        p, values = shape.value(np.arange(len(u)) * self.Ts), {}
+            return simulate_fault(plant, replace(fault.acting, profile=shape), x0, u, rng, substeps=_SUBSTEPS)
+        return self._moved(plant, fault, shape.value(np.arange(len(u)) * self.Ts), x0, u, rng)
+
+    def _moved(
+        self, plant: NonlinearModel, fault: FaultModel, p: Array, x0: Array, u: Array, rng: np.random.Generator
+    ) -> Log:
+        """The healthy plant until the fault's share p (K,) is above zero, then the faulty one."""
+        faulty: Any = fault.model
+        begins = int(np.argmax(p > 0.0))
+        before = plant.simulate(x0, u[: begins + 1], rng, substeps=_SUBSTEPS)
+        assert before.x is not None
+        known, values = dict(zip(plant.flow.states, before.x[begins], strict=True)), {}
         for name in fault.moved:
-            low, high = np.broadcast_to(plant.parameters.get(name, 0.0), 2)
-            healthy = rng.uniform(low, high, len(u))
-            values[name] = np.clip((1.0 - p) * healthy + p * full_size(model, plant, name), *_ends(model, name))
-        return model.replace(n=plant.noise).simulate(
-            x0[: model.n_states], u, rng, substeps=_SUBSTEPS, parameters=values
-        )
+            low, high = np.broadcast_to(known.get(name, plant.parameters.get(name, 0.0)), 2)
+            healthy, share = rng.uniform(low, high, len(u) - begins), p[begins:]
+            moved = (1.0 - share) * healthy + share * full_size(faulty, plant, name)
+            values[name] = np.clip(moved, *_ends(faulty, name))
+        begun = [known[name] for name in faulty.flow.states]
+        after = faulty.replace(n=plant.noise).simulate(begun, u[begins:], rng, substeps=_SUBSTEPS, parameters=values)
+        own = values | dict(zip(faulty.flow.states, after.x.T, strict=True))
+        x = np.vstack([before.x[:begins], np.column_stack([own[name] for name in plant.flow.states])])
+        time: Array = np.arange(len(u), dtype=float) * self.Ts
+        return Log(time, u, np.vstack([before.y[:begins], after.y]), x=x)
 
     # -- what else it offers ---------------------------------------------------------------------------------
 

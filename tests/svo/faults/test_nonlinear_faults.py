@@ -109,6 +109,22 @@ def test_the_healthy_model_does_not_explain_a_large_fault(name: str) -> None:
     pytest.fail("it was not found")
 
 
+@pytest.mark.parametrize("x0", [[1.0], [1.0, 1.2, 1.05]])
+def test_a_constant_parameter_is_one_until_a_fault_moves_it(x0: list[float]) -> None:
+    model = NonlinearModel(
+        lambda x, u, p: [u[0] - p[0] * x[0] * p[1]], lambda x: [x[0]], states=["x"], inputs=["u"],
+        parameters={"a": (0.5, 1.5), "b": (0.9, 1.1)}, constant=True, Ts=0.1, n=[0.01], largest=([0], [9]),
+    )  # fmt: skip
+    for fault in (ParameterFault("a", 0.5, Step(2.0)), ParameterFault("b", -0.4, Step(2.0))):
+        log = simulate_fault(model, fault, x0, np.ones((40, 1)), np.random.default_rng(SEED))
+        moved = 1 if fault.parameter == "a" else 2
+        assert log.x[:, moved] == pytest.approx(log.x[0, moved] + fault.delta(log.time), rel=1e-15)
+        assert len(x0) == 1 or log.x[0].tolist() == x0
+        start = HPolytope.box([0.9], [1.1])
+        assert 20 < (WindowObserver(model, start).run(log).falsified_at or 0) < 30
+        assert WindowObserver(fault.model(model), start).run(log).falsified_at is None
+
+
 def test_a_bank_isolates_one_of_three() -> None:
     case = crane()
     faults = {name: FAULTS[name] for name in ("frozen", "hard-over", "parameter")}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from time import process_time
 
 import numpy as np
 import pytest
 
 from polytopes import HPolytope
-from svo import ArchitectureII, WindowObserver
+from svo import ArchitectureII, Log, WindowObserver
 from svo.functions import sqrt
 from svo.models.nonlinear import NonlinearModel
 
@@ -238,3 +239,18 @@ def test_a_bank_that_starts_an_observer_where_it_has_no_values_is_undecided_and_
         x += 0.1 * (1.0 - x + 1.0 / (x + 0.5))
         states.append(bank.step([1.0], [x]).state)
     assert states[-1] in ("isolated", "detected")
+
+
+def test_the_reason_of_an_observer_that_starts_late_has_the_sample_of_the_log_and_an_end_that_is_outside() -> None:
+    common = {"states": ["x", "z"], "inputs": ["u"], "n": 0.05, "Ts": 0.1, "largest": ([0, 0], [5, 5])}
+    healthy = NonlinearModel({"x": "u - x", "z": "-z"}, {"y": "x"}, **common)
+    faulty = healthy.replace(f={"x": "2 * u - x", "z": "-z"}, valid=([-1, -1], [9, 5]))
+    start = HPolytope.box([0.9, 0], [1.1, 1])
+    leak = {"leak": WindowObserver(faulty, start)}
+    bank = ArchitectureII(WindowObserver(healthy, start), leak, HPolytope.box([0, 0], [5, 5]))
+    y = np.where(np.arange(16) < 10, 1.0, 3.0)[:, None]  # the leak's observer starts at sample 10
+    reason = bank.run(Log(np.arange(16) * 0.1, np.ones((16, 1)), y)).reason
+    assert reason is not None
+    found = re.fullmatch(r"leak, outside: at sample 11, z may be in \[(.*), (.*)\], outside valid = \[-1, 5\]", reason)
+    assert found is not None, reason
+    assert float(found[2]) > 5.0

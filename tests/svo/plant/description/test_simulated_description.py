@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from svo import WindowObserver
 from svo.cli import app
 from svo.detectors.detector import Setting
 from svo.indices import first_true
@@ -94,6 +95,30 @@ def test_a_run_is_what_its_table_says(tmp_path: Path) -> None:
     gaussian = one.with_noise("gaussian")
     excess = [np.abs(log.y - log.x).max() for log in (gaussian.simulate("none", "none", "stated", s) for s in range(5))]
     assert max(excess) > 0.1
+
+
+_LEAK = "parameters = { hole = [0.29, 0.6] }\n"
+_OTHER = '[faults.leak.dynamics]\nh = "(pump - 2 * hole * sqrt(1962 * h)) / area + d"\n'
+
+
+@pytest.mark.parametrize("leak", [_LEAK, _LEAK.replace("0.29", "0.5"), _OTHER])
+@pytest.mark.parametrize("constant", [[], ["area"], ["area", "hole"]])
+def test_before_a_fault_the_plant_is_healthy(tmp_path: Path, leak: str, constant: list[str]) -> None:
+    """Also where it is none of those that the fault's model has."""
+    starts = "" if leak == _LEAK else "[global]\nlower = [0.0]\nupper = [60.0]\n"
+    if starts and leak != _OTHER and "hole" in constant:
+        pytest.skip("refused: no set says where a constant is that the fault moves")
+    text = TEXT.replace(_LEAK, leak).replace("/ 154", "/ area").replace("physical", f"constant = {constant}\nphysical")
+    path = tmp_path / "tank.toml"
+    path.write_text(text.replace("[parameters]", "[parameters]\narea = [150, 158]") + starts, encoding="utf-8")
+    one = simulated_plant(path)
+    for seed, profile in enumerate(("step", "soft", "step")):
+        log = one.simulate("leak", profile, "stated", seed)
+        assert log.x is not None
+        assert log.x.shape == (30, one.model.n_states) == (30, 1 + len(constant))
+        assert (np.ptp(log.x[:15, 1:], axis=0) == 0.0).all()
+        found = WindowObserver(one.model, one.described.initial).run(log).falsified_at
+        assert 15 <= (found or 0) < 25
 
 
 def test_the_stated_faults_are_told_apart(tmp_path: Path) -> None:
