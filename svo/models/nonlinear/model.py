@@ -370,7 +370,15 @@ class NonlinearModel(Value, Shown):
     # -- simulation ------------------------------------------------------------------------------
 
     def first_state(self, x0: ArrayLike, rng: np.random.Generator, *, corners: bool = False) -> Array:
-        """x0 (n,) as it is; of the states of f alone, with a drawn value of each parameter that is constant.
+        """The state at the first sample of a run.
+
+        Parameters
+        ----------
+        x0 : (n,) array
+            Or only the states of f: parameters that are constant are then drawn.
+        rng : numpy.random.Generator
+        corners : bool
+            Draw ends of the bounds.
 
         Raises
         ------
