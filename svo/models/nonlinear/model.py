@@ -369,6 +369,7 @@ class NonlinearModel(Value, Shown):
 
     # -- simulation ------------------------------------------------------------------------------
 
+    @options_by_name
     def first_state(self, x0: ArrayLike, rng: np.random.Generator, *, corners: bool = False) -> Array:
         """The state at the first sample of a run.
 

@@ -68,8 +68,24 @@ def advanced(
     for piece in range(pieces):
         if piece:
             w = np.where(flow.varying, draw(flow.w.lower, flow.w.upper, rng, corners), w)
-        x = integrated(flow, x, w, u, T / pieces, substeps)
+        after = integrated(flow, x, w, u, T / pieces, substeps)
+        x = _within_faces(flow, x, after, w, u, T / pieces / substeps)
     return x
+
+
+def _within_faces(flow: Flow, x: Array, after: Array, w: Array, u: Array, step: float) -> Array:
+    """The state after x, on faces of the physical range which the plant does not cross, but the integrator did.
+
+    It may do so by less than a ``step`` [s].
+    """
+    if flow.physical is None:
+        return after
+    on = np.clip(after, flow.physical.lower, flow.physical.upper)
+    if np.array_equal(on, after, equal_nan=True):
+        return after
+    before, there = (flow.tape.values(np.concatenate([at, w, u])) for at in (x, on))
+    is_step = (np.abs(on - after) <= step * np.abs(before)) & (there * (on - after) >= 0.0)
+    return np.where(is_step, on, after)
 
 
 def integrated(flow: Flow, x: Array, w: Array, u: Array, T: float, substeps: int) -> Array:
@@ -91,5 +107,5 @@ def _check(flow: Flow, x: Array, sample: int) -> None:
         j = int(np.argmin(inside))
         raise ValueError(
             f"{flow.states[j]} is {x[j]} after sample {sample}, where the equations have no value or outside physical; "
-            "expected an x0, inputs and bounds of w that keep the plant there"
+            "expected an x0, inputs and bounds of w that keep the plant there, and more substeps if it is fast"
         )

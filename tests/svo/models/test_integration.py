@@ -48,6 +48,25 @@ def test_the_core_integrates_as_numpy_does(name: str) -> None:
     np.testing.assert_array_equal(integrated(flow, x[2], w[2], u, model.Ts, 5), found[2])
 
 
+@pytest.mark.parametrize("substeps", [1, 3, 20])
+def test_a_tank_that_runs_empty_is_simulated(substeps: int) -> None:
+    """The integrator steps over the face at which the flow ends; what the plant itself leaves is an error."""
+    model = NonlinearModel(
+        lambda x, u: [u[0] - 0.8 * sqrt(x[0]), 0.8 * sqrt(x[0]) - 0.6 * sqrt(x[1])], lambda x: [x[1]],
+        states=["h1", "h2"], inputs=["Q"], Ts=0.2, n=[0.05], physical=([0, 0], [9, 9]),
+    )  # fmt: skip
+    rng = np.random.default_rng(0)
+    u = np.where(np.arange(150) % 70 < 15, 0.8, 0.0)[:, None]
+    for first in rng.uniform(0.0, 0.5, (10, 2)) ** 3:
+        log = model.simulate(first, u, rng, substeps=substeps)
+        assert log.x is not None
+        assert log.x.min() == log.x[60, 0] == 0.0 < log.x[149, 0]
+    with pytest.raises(ValueError, match="h1 is -.* outside physical"):
+        model.simulate([0.1, 0.1], -u, rng, substeps=substeps)
+    with pytest.raises(ValueError, match="more substeps if it is fast"):
+        model.replace(f=lambda x, u: [300.0 * (1.0 - x[0]), u[0] - x[1]]).simulate([0.5, 0.5], u, rng, substeps=2)
+
+
 def test_where_a_function_has_no_value_there_is_none() -> None:
     model = NonlinearModel(
         lambda x: [sqrt(x[0]), log(x[1]), exp(x[2]), 1.0 / x[3]], lambda x: [x[0]],
