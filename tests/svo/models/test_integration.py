@@ -61,7 +61,7 @@ def test_a_tank_that_runs_empty_is_simulated(substeps: int) -> None:
         log = model.simulate(first, u, rng, substeps=substeps)
         assert log.x is not None
         assert log.x.min() == log.x[60, 0] == 0.0 < log.x[149, 0]
-    with pytest.raises(ValueError, match="h1 is -.* outside physical"):
+    with pytest.raises(ValueError, match=r"h1 is -.* outside physical"):
         model.simulate([0.1, 0.1], -u, rng, substeps=substeps)
     with pytest.raises(ValueError, match="more substeps if it is fast"):
         model.replace(f=lambda x, u: [300.0 * (1.0 - x[0]), u[0] - x[1]]).simulate([0.5, 0.5], u, rng, substeps=2)
