@@ -19,6 +19,7 @@ _BLANK = b"\n" * 10_000
 _MAGIC = b"\x1f\x8b"
 _CHUNK = 2**16
 _AT_LEAST, _MOST_TIMES = 4 * 2**20, 50  # unpacked bytes: text packs 5 to 20 times, zeros a thousand
+_MEMBERS, _MEMBER = 1000, 48  # so many are read whatever they hold, more if they have that many bytes on average
 
 
 def packed(content: bytes) -> bytes:
@@ -90,9 +91,11 @@ def _unpacked(path: str | Path) -> Iterator[bytes]:
 
 def _chunks(file: IO[bytes], path: str | Path) -> Iterator[bytes]:
     """What members unpack to, in portions."""
-    member, produced = zlib.decompressobj(31), 0
+    member, produced, members = zlib.decompressobj(31), 0, 1
     waiting = file.read(_CHUNK)
     while waiting:
+        if members > _MEMBERS + file.tell() // _MEMBER:
+            raise ValueError(f"{path} is no file of records: its gzip members hold next to nothing")
         try:
             chunk = member.decompress(waiting, 16 * _CHUNK)
         except zlib.error as error:
@@ -104,6 +107,6 @@ def _chunks(file: IO[bytes], path: str | Path) -> Iterator[bytes]:
             raise ValueError(f"{path} is damaged: a gzip member in it holds nothing")
         waiting = waiting or file.read(_CHUNK)
         if member.eof and waiting:
-            member, produced = zlib.decompressobj(31), 0
+            member, produced, members = zlib.decompressobj(31), 0, members + 1
     if not member.eof:
         raise ValueError(f"{path} ends within a gzip member; what it holds before that is lost with it")

@@ -206,6 +206,7 @@ CONSTANTS = (
     Constant("svo.observers.proof_record", "_MOST_SAMPLES", "heuristic"),
     Constant("svo.isolation.alarm_record", "_MOST_ENTRIES", "heuristic"),
     Constant("svo.store.packed_lines", "_MOST_TIMES", "heuristic"),
+    Constant("svo.store.packed_lines", "_MEMBER", "heuristic"),
     Constant("polytopes.general_position", "WIDE", "heuristic"),
     Constant("polytopes.plotting", "_REACH", "heuristic"),
 )

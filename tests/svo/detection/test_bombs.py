@@ -47,7 +47,7 @@ def of_lines(line: bytes) -> Iterator[tuple[str, bytes]]:
     yield "blank lines", packed(b"\n" * 2**20) * 500
     yield "one line", packed(b'{"a": "' + b"x" * 2**26)
     yield "empty members", packed(b"") * 10**5
-    yield "small members", packed(b" ") * 10**5
+    yield "small members", packed(b" ") * 10**6
     yield "cut", packed(line)[:-9]
     yield "bytes behind", packed(line) + b"\x1f\x8b" * 10**5
     yield "nothing", b""
