@@ -470,7 +470,6 @@ def main():
     for name in ("proof", "--model", "--log"):
         parser.add_argument(name, **{"required": True} if name[0] == "-" else {})
     given, begun = parser.parse_args(), time.process_time()
-    sys.stdout.reconfigure(errors="backslashreplace")
     try:
         plant = parsed(Path(at := given.model).read_bytes())
         expect(plant.get("format") == "svo-plant-1", "the model is not of the format svo-plant-1")
@@ -496,4 +495,5 @@ def main():
 
 
 if __name__ == "__main__":
+    sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(main())
