@@ -62,7 +62,7 @@ def real_array(
     ValueError
         If it has another shape, a missing entry, an infinity, or a number that no float equals.
     """
-    array = np.array(value, order="C") if _is_float_array(value) else _converted(name, value, missing)
+    array = value.copy() if _is_float_array(value) else _converted(name, value, missing)
     if shapes and not _fit(array.shape, shapes):
         raise ValueError(_misfit(name, array.shape, shapes, meaning))
     if math.isfinite(np.vdot(array, array)) or np.isfinite(array).all():  # squares may leave the floats

@@ -71,6 +71,12 @@ def address(array: NDArray) -> int:
     return int(array.__array_interface__["data"][0])
 
 
+def arrays(rows: InCore) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A (m, n) and b (m,) of rows, made of bytes that nobody can write."""
+    n, m, A, b = rows
+    return np.ndarray((m, n), np.float64, A), np.ndarray(m, np.float64, b)
+
+
 handle: Callable[[NDArray], Any] = _bytes  # type: ignore[assignment]
 """An array as an `Address` that keeps it alive: for one that goes to the core again and again."""
 

@@ -25,7 +25,7 @@ from polytopes.linear_program import (
     Program,
     small,
 )
-from polytopes.native import Address, Entries, Given, InCore, Integer, Real, function, handle, scratch
+from polytopes.native import Address, Entries, Given, InCore, Integer, Real, arrays, function, handle, scratch
 from polytopes.rounding import check_rounding
 
 _prepare = function("fdi_prepared", *[Integer] * 2, *[Address] * 2, *[Real] * 2, *[Address] * 2, returns=Integer)
@@ -51,22 +51,20 @@ def _sizes(n: int, m: int) -> tuple[int, int]:
 class PreparedRows(NamedTuple):
     """Rows ``A x <= b``, and the block of the core that they are prepared in."""
 
-    A: Floats
-    b: Floats
     rows: InCore
     block: Floats
     at: Any
 
     @classmethod
-    def of(cls, A: Floats, b: Floats, rows: InCore) -> Self | None:
-        """The rows A (m, n), b (m,) prepared; None where floats do not settle at once that a ball fits in."""
+    def of(cls, rows: InCore) -> Self | None:
+        """The rows prepared; None where floats do not settle at once that a ball fits in."""
         check_rounding()
         size, room = _sizes(rows[0], rows[1])
         if not size:
             return None
         block = np.empty(size)
         at = handle(block)
-        return cls(A, b, rows, block, at) if _prepare(*rows, WIDEST, SMALL_BALL, at, scratch(room)) else None
+        return cls(rows, block, at) if _prepare(*rows, WIDEST, SMALL_BALL, at, scratch(room)) else None
 
     @property
     def centre(self) -> Floats:
@@ -98,7 +96,7 @@ class PreparedRows(NamedTuple):
     def maxima(self, directions: Floats) -> Maxima | None:
         """The same with points and multipliers."""
         k = len(directions)
-        values, points, weights = np.empty(k), np.empty(directions.shape), np.zeros((k, self.b.size))
+        values, points, weights = np.empty(k), np.empty(directions.shape), np.zeros((k, self.rows[1]))
         if not self._settled(directions, values, handle(points), handle(weights)):
             return None
         return Maxima(values, points, weights, [UNBOUNDED if value == np.inf else OPTIMAL for value in values.tolist()])
@@ -130,18 +128,19 @@ class PreparedRows(NamedTuple):
 
     def program(self) -> Program:
         """The rows as a program, its largest ball known."""
-        m, n = self.A.shape
+        n, m = self.rows[:2]
+        A, b = arrays(self.rows)
         _, _, AT, rhs, norms, centre, weights, _, columns, rows = self._parts()
         radius, powers, row_powers = self.radius, columns.view(np.int64), rows.view(np.int64)
         flat, AT, every = _everywhere(n), AT.reshape(n, m), np.arange(m)
-        exact = EvenRows(self.A, self.b, flat, row_powers, powers)
-        program = Program(self.A, self.b, flat, exact, AT, rhs, norms, row_powers, powers, every, None)
+        exact = EvenRows(A, b, flat, row_powers, powers)
+        program = Program(A, b, flat, exact, AT, rhs, norms, row_powers, powers, every, None)
         program.__dict__["interior"] = Interior(program.lift(centre[:n]), centre[:n], radius, weights, True)
         return program
 
     def _parts(self) -> list[Floats]:
         """Head, point, AT, rhs, norms, centre, multipliers, reach, exponents of columns and rows, as in the core."""
-        m, n = self.A.shape
+        n, m = self.rows[:2]
         parts, end = [], 0
         for size in (2, n, n * m, m, m, n + 1, m, n, n, m):
             parts.append(self.block[end : end + size])

@@ -1,8 +1,8 @@
 """The rows of an H-polytope: validated once, read-only, with what is derived from them kept beside them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ from polytopes.integers import is_short
 from polytopes.lengths import evened, lengths
 from polytopes.linear_program import Program
 from polytopes.minkowski_weyl import ExactGenerators
-from polytopes.native import Address, InCore, Integer, function
+from polytopes.native import Address, InCore, Integer, arrays, function
 from polytopes.preparation import prepare
 from polytopes.prepared import PreparedRows
 from polytopes.short_sets import Corners, has_short_rows, short_vertices
@@ -52,27 +52,23 @@ class Rows(Value):
     b: Floats
     C: Floats
     d: Floats
+    in_core: InCore = field(init=False, repr=False)
 
     def __init__(self, A: ArrayLike, b: ArrayLike, C: ArrayLike | None = None, d: ArrayLike | None = None) -> None:
-        plain = _are_arrays(A, b) and _hold_nothing(C, d, A.shape[1])  # type: ignore[union-attr]
-        if not (plain and self._hold(A, b, *no_equalities(A.shape[1]))):  # type: ignore[arg-type, union-attr]
-            self._hold(*_checked(A, b, C, d))
-
-    def _hold(self, A: Floats, b: Floats, C: Floats, d: Floats) -> bool:
-        """Take copies of A and b, as bytes that nobody can write, and C and d as they are; not if A, b is infinite."""
-        (m, n), rows, sides = A.shape, A.tobytes(), b.tobytes()
-        seen = _look(n, m, rows, sides)
-        if seen == _NOT_FINITE:
-            return False
-        self._keep((n, m, rows, sides), C, d)
+        rows = _as_they_are(A, b, C, d)
+        seen = _NOT_FINITE if rows is None else _look(*rows)
+        if rows is None or seen == _NOT_FINITE:
+            A, b, fixed, values = _checked(A, b, C, d)
+            rows = A.shape[1], b.size, A.tobytes(), b.tobytes()
+            seen = _look(*rows)
+        else:
+            fixed, values = no_equalities(rows[0])
+        self._keep(rows, fixed, values)
         self.__dict__["one_entry_a_row"] = seen == _ONE_ENTRY_A_ROW
-        return True
 
     def _keep(self, rows: InCore, C: Floats, d: Floats) -> None:
-        n, m, A, b = rows
         own = self.__dict__
         own["in_core"], own["C"], own["d"] = rows, C, d
-        own["A"], own["b"] = np.ndarray((m, n), _FLOAT, A), np.ndarray(m, _FLOAT, b)
 
     @classmethod
     def from_core(cls, rows: InCore) -> Self:
@@ -80,6 +76,16 @@ class Rows(Value):
         made = cls.__new__(cls)
         made._keep(rows, *no_equalities(rows[0]))
         return made
+
+    if not TYPE_CHECKING:  # to a type checker they are fields as any
+
+        def __getattr__(self, name: str) -> Any:
+            """A and b, made of what the core has when they are first asked for."""
+            if name not in ("A", "b"):
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+            own = self.__dict__
+            own["A"], own["b"] = arrays(self.in_core)
+            return own[name]
 
     def __reduce__(self) -> tuple[type[Self], Table]:
         return type(self), self.table  # what is derived from them is derived again
@@ -92,12 +98,7 @@ class Rows(Value):
     @property
     def dim(self) -> int:
         """Dimension n of the space."""
-        return int(self.A.shape[1])
-
-    @derived
-    def in_core(self) -> InCore:
-        """The rows of A and b as the core takes them."""
-        return self.dim, self.b.size, self.A.tobytes(), self.b.tobytes()
+        return self.in_core[0]
 
     @derived
     def one_entry_a_row(self) -> bool:
@@ -107,7 +108,7 @@ class Rows(Value):
     @derived
     def prepared(self) -> PreparedRows | None:
         """The rows prepared by the core, where it settles at once that a ball fits in."""
-        return None if self.d.size else PreparedRows.of(self.A, self.b, self.in_core)
+        return None if self.d.size else PreparedRows.of(self.in_core)
 
     @derived
     def program(self) -> Program:
@@ -123,8 +124,13 @@ class Rows(Value):
     def point_at_once(self) -> Floats | None:
         """A point (n,) of a box, or one that floats find with slack beyond rounding; None if it takes longer."""
         if self.as_box is not None:
-            return self.as_box.point
-        return None if self.prepared is None else self.prepared.centre
+            point = self.as_box.point
+        elif self.prepared is not None:
+            point = self.prepared.centre
+        else:
+            return None
+        point.setflags(write=False)  # it is kept, as a witness
+        return point
 
     @derived
     def decided(self) -> Emptiness:
@@ -188,17 +194,18 @@ class Rows(Value):
         return type(self)(A, b, self.C, self.d)
 
 
-def _are_arrays(A: Any, b: Any) -> bool:
-    """Whether they are arrays of floats that fit, as most are; anything else takes a closer look."""
-    if type(A) is not np.ndarray or type(b) is not np.ndarray or not A.dtype == b.dtype == _FLOAT:
-        return False
-    return A.ndim == 2 and b.ndim == 1 and len(A) == len(b) and A.shape[1] > 0
+def _as_they_are(A: Any, b: Any, C: Any, d: Any) -> InCore | None:
+    """Copies of arrays of floats that fit, without equalities, as most sets have; anything else takes a closer look."""
+    if type(A) is not np.ndarray or type(b) is not np.ndarray or not A.dtype == b.dtype == _FLOAT or A.ndim != 2:
+        return None
+    m, n = A.shape
+    if b.shape != (m,) or n == 0 or not (C is d is None or _hold_nothing(C, d, n)):
+        return None
+    return n, m, A.tobytes(), b.tobytes()
 
 
 def _hold_nothing(C: Any, d: Any, n: int) -> bool:
-    """Whether equalities were not given, or none in R^n."""
-    if C is None or d is None:
-        return C is d
+    """Whether equalities are arrays of none in R^n."""
     return type(C) is np.ndarray and type(d) is np.ndarray and C.shape == (0, n) and d.shape == (0,)
 
 

@@ -87,9 +87,7 @@ def _directions(P: Rows, directions: ArrayLike) -> Floats:
 def support(P: Rows, directions: ArrayLike) -> float | Floats:
     """``h_P(c)`` for one direction (n,) or a batch (k, n): a float or an array (k,)."""
     array = _directions(P, directions)
-    batch = array[None] if array.ndim == 1 else array
-    values = supports(P, batch)
-    return float(values[0]) if array.ndim == 1 else values
+    return supports(P, array[None]).item() if array.ndim == 1 else supports(P, array)
 
 
 def supports(P: Rows, directions: Floats) -> Floats:

@@ -147,7 +147,7 @@ def test_a_failed_solver_is_never_an_empty_set(monkeypatch: pytest.MonkeyPatch) 
     def silent(self: HighsProgram, c: np.ndarray) -> HighsOutcome:
         return HighsOutcome("infeasible", float("nan"), np.empty(0), np.empty(0))
 
-    monkeypatch.setattr(PreparedRows, "of", lambda A, b, rows: None)
+    monkeypatch.setattr(PreparedRows, "of", lambda rows: None)
     monkeypatch.setattr(kernel, "interior", failing)
     monkeypatch.setattr(HighsProgram, "maximise", silent)
     skew = HPolytope.box([1.0, 1.0], [2.0, 2.0]).intersection(HPolytope([[1.0, 1.0]], [3.0]))
