@@ -91,7 +91,6 @@ EXPORTED integer fdi_prepared_ball(integer d, integer m, const double *rows, dou
     return 1;
 }
 
-static const integer MANY = 30;     /* coordinates from which programs along all axes take long */
 static const double TIGHT = 1e-12; /* gap, of the terms, that rounding leaves */
 
 typedef struct {
@@ -147,13 +146,13 @@ static int find_reach(Prepared *set, integer d, integer m, double *block)
     return 1;
 }
 
-/* Bounds (d,) of |x| over the set from the rows W whose multipliers y prove its largest ball; 0 if there are none.
+/* Bounds (d,) `reach` of |x| over the set from the rows W whose multipliers y prove its largest ball; 0 if there are none.
  *
  * y'A is about zero, so that no slack of a row in W is above y'b / y_i, and seen from the centre c no |a_i'(x - c)| is
  * above that. With R the inverse of d of these rows, |x - c| <= |R| times that, up to what rounding left: of R, F = R A - I,
  * and e = y'A, both of which count with |x| itself.
  */
-static int reach_of_ball(Prepared *set, integer d, integer m, double *block)
+static int reach_of_ball(const Prepared *set, integer d, integer m, double *reach, double *block)
 {
     Memory memory = {block, 0};
     integer *W = integers(&memory, d + 1), count = 0, least_one = 0;
@@ -205,7 +204,7 @@ static int reach_of_ball(Prepared *set, integer d, integer m, double *block)
         turned = larger(turned, off);
     }
     if (!(turned < 0.25 && far < INFINITY)) return 0;
-    for (integer j = 0; j < d; j++) set->reach[j] = fabs(set->centre[j]) + 1.5 * far;
+    for (integer j = 0; j < d; j++) reach[j] = fabs(set->centre[j]) + 1.5 * far;
     return 1;
 }
 
@@ -229,22 +228,25 @@ static int tight(integer k, integer d, const Question *question)
     return 1;
 }
 
-/* The bounds of the forms that were solved, by a bound of |x|: in many coordinates first by one that costs nothing. */
-static int bounds_of(Prepared *set, integer d, integer m, integer k, const Question *question, double *spare_block)
+/* The bounds of the forms that were solved, by a bound of |x|: first by one that costs nothing, and where that is not near
+ * enough by one from programs along all axes, which is kept. */
+static int bounds_of(Prepared *set, integer d, integer m, integer k, const Question *question, double *block)
 {
     const double *beside = question->found + 2 * k * d, *bounds = beside + k * d;
-    int rounded = 0, known = 0;
+    double *near = block;
+    int rounded = 0;
     for (integer q = 0; q < k * d; q++) rounded |= beside[q] > 0.0;
-    known = !rounded || !isnan(set->reach[0]);
-    for (int careful = !known && d < MANY; careful < 2; careful++) {
-        if (!known && !(careful ? find_reach(set, d, m, spare_block) : reach_of_ball(set, d, m, spare_block))) continue;
-        fdi_gaps(d, k, question->forms, question->found, bounds, bounds + k, beside, set->reach, question->gaps);
-        if (known || careful) return 1;
-        set->reach[0] = NAN; /* only the nearer one is kept */
-        if (tight(k, d, question)) return 1;
+    const int quick = !rounded || reach_of_ball(set, d, m, near, block + d);
+    if (quick) {
+        fdi_gaps(d, k, question->forms, question->found, bounds, bounds + k, beside, near, question->gaps);
+        if (!rounded || tight(k, d, question)) return 1;
     }
-    set->reach[0] = NAN;
-    return 0;
+    if (isnan(set->reach[0]) && !find_reach(set, d, m, block)) {
+        set->reach[0] = NAN;
+        return 0;
+    }
+    fdi_gaps(d, k, question->forms, question->found, bounds, bounds + k, beside, set->reach, question->gaps);
+    return 1;
 }
 
 /* A lower bound of a form over a prepared set: its value at a point z, drawn towards the centre of the largest ball until
