@@ -25,13 +25,13 @@ from polytopes.linear_program import (
     Program,
     small,
 )
-from polytopes.native import Address, Entries, Given, InCore, Integer, Real, arrays, function, handle, scratch
+from polytopes.native import Address, Entries, InCore, Integer, Real, arrays, function, handle, scratch
 from polytopes.rounding import check_rounding
 
 _prepare = function("fdi_prepared", *[Integer] * 2, *[Address] * 2, *[Real] * 2, *[Address] * 2, returns=Integer)
 _ball = function("fdi_prepared_ball", *[Integer] * 2, *[Address] * 2, *[Real] * 2, Entries, Address, returns=Integer)
 _supports = function(
-    "fdi_prepared_supports", *[Integer] * 3, Address, Given, *[Real] * 2, Entries, *[Address] * 4, returns=Integer
+    "fdi_prepared_supports", *[Integer] * 3, *[Address] * 2, *[Real] * 2, Entries, *[Address] * 4, returns=Integer
 )
 _facets = function("fdi_prepared_facets", *[Integer] * 2, Address, Entries, Address, returns=Integer)
 _size, _room = (function(f"fdi_prepared_{name}", *[Integer] * 2, returns=Integer) for name in ("size", "room"))
@@ -108,7 +108,7 @@ class PreparedRows(NamedTuple):
         n, m, k = *self.rows[:2], len(directions)
         room = scratch(_supports_room(n, m, k))
         settled: int = _supports(
-            n, m, k, self.at, directions, CLEAN, SHARP, values, points, weights, lower, room
+            n, m, k, self.at, directions.tobytes(), CLEAN, SHARP, values, points, weights, lower, room
         )
         return settled
 

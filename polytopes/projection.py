@@ -34,6 +34,7 @@ from polytopes.minkowski_weyl import shadow
 from polytopes.outer_supports import upper_supports
 from polytopes.outer_template import outer_template
 from polytopes.outward import float_rows
+from polytopes.prepared import PreparedRows
 from polytopes.rows import Rows, Table, no_equalities
 from polytopes.support import known_nonempty, maxima
 from polytopes.vertices import vertices
@@ -111,13 +112,16 @@ def _shadow_at_once(P: Rows, keep: list[int]) -> Table | None:
         lower, upper = P.as_box.corners[:, keep]
         return *box_rows(lower, upper), *no_equalities(len(keep))
     if P.corners is not None and P.corners.exact and len(P.corners.points) <= _FEW_CORNERS:
-        points = P.corners.points[:, keep]
         if len(keep) > 1:
-            return exact_hull(points)
-        return *box_rows(points.min(axis=0), points.max(axis=0)), *no_equalities(1)
-    if len(keep) > 1 or P.prepared is None or P.short:
-        return None
-    values = P.prepared.supports(both_ways(P.dim)[[keep[0], P.dim + keep[0]]])
+            return exact_hull(P.corners.points[:, keep])
+        values = P.corners.points[:, keep[0]].tolist()
+        return both_ways(1), np.array([max(values), 0.0 - min(values)]), *no_equalities(1)
+    return None if len(keep) > 1 or P.prepared is None or P.short else _ends(P.prepared, P.dim, keep[0])
+
+
+def _ends(rows: PreparedRows, n: int, j: int) -> Table | None:
+    """The shadow of a set of R^n on a coordinate by its supports; None if floats do not settle them."""
+    values = rows.supports(both_ways(n)[j::n])
     if values is None:
         return None
     ends = values < np.inf

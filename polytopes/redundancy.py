@@ -48,6 +48,9 @@ def minimal_rows(P: Rows) -> Table:
     leaves open are decided in coordinates where P is about a unit ball, then in rationals.  The empty set is
     ``0'x <= -1``.
     """
+    at_once = None if P.prepared is None else P.prepared.facets()
+    if at_once is not None:
+        return P.A[at_once], P.b[at_once], P.C, P.d
     if not known_nonempty(P):
         return nothing(P.dim)
     kept = kept_rows(P)

@@ -80,13 +80,9 @@ def maxima(P: Rows, directions: Floats) -> Maxima | None:
     return result
 
 
-def _directions(P: Rows, directions: ArrayLike) -> Floats:
-    return real_array("directions", directions, (P.dim,), ("k", P.dim))
-
-
 def support(P: Rows, directions: ArrayLike) -> float | Floats:
     """``h_P(c)`` for one direction (n,) or a batch (k, n): a float or an array (k,)."""
-    array = _directions(P, directions)
+    array = real_array("directions", directions, (P.dim,), ("k", P.dim))
     return supports(P, array[None]).item() if array.ndim == 1 else supports(P, array)
 
 
@@ -101,24 +97,19 @@ def supports(P: Rows, directions: Floats) -> Floats:
 
 def supports_at_once(P: Rows, directions: Floats) -> Floats | None:
     """The same by one call of the core, where P is a box or settled by floats; None if it is not."""
-    values = _of_box(P, directions)
+    values = None if P.as_box is None else P.as_box.supports(directions)
     return P.prepared.supports(directions) if values is None and P.prepared is not None else values
-
-
-def _of_box(P: Rows, directions: Floats) -> Floats | None:
-    """Supports without a program, where P is a box."""
-    return None if P.as_box is None else P.as_box.supports(directions)
 
 
 def support_points(P: Rows, directions: ArrayLike) -> SupportResult:
     """Values, points and multipliers for one direction (n,) or a batch (k, n)."""
-    batch = np.atleast_2d(_directions(P, directions))
+    batch = np.atleast_2d(real_array("directions", directions, (P.dim,), ("k", P.dim)))
     result = maxima(P, batch)
     k, q = len(batch), P.d.size
     if result is None:
         nowhere = np.full((k, P.dim), np.nan)
         return SupportResult(np.full(k, -np.inf), nowhere, np.zeros((k, P.b.size)), np.zeros((k, q)))
-    known = _of_box(P, batch)
+    known = None if P.as_box is None else P.as_box.supports(batch)
     values = result.values if known is None else known
     finite = np.isfinite(values)
     points = np.where(finite[:, None], result.points, np.nan)
