@@ -5,9 +5,11 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
+from keyword import iskeyword
 from typing import Any
+from unicodedata import normalize
 
 from svo import functions
 from svo.functions.expression import Expression, NoValue, Recorder
@@ -46,17 +48,30 @@ def parsed(where: str, text: str, recorder: Recorder, symbols: Mapping[str, Expr
         raise TypeError(f"{where} is a {type(text).__name__}; expected an expression as text, such as 'u - a * h'")
     if len(text) > _LONGEST:
         raise ValueError(f"{where} has {len(text)} characters; expected at most {_LONGEST}")
+    known = {as_read(name): symbol for name, symbol in symbols.items()}
     flat = text.replace("\n", " ").strip()
     if not flat:
         raise ValueError(f"{where}: invalid syntax, it is empty; expected an expression, such as 'u - a * h'")
     try:
         tree = ast.parse(flat, mode="eval").body
-        return recorder.constant(_Reader(where, flat, recorder, symbols).value(tree))
+        return recorder.constant(_Reader(where, flat, recorder, known).value(tree))
     except SyntaxError as error:
         at = f" at column {error.offset}" if error.offset else ""
-        raise ValueError(f"{where}: {error.msg}{at} of {flat!r:.200}") from None
+        what = "a number has too many digits" if "integer string conversion" in error.msg else error.msg
+        raise ValueError(f"{where}: {what}{at} of {flat!r:.200}{_unwritable(known)}") from None
     except (RecursionError, MemoryError):
         raise ValueError(f"{where} is nested too deeply; expected a simpler expression") from None
+
+
+def as_read(name: str) -> str:
+    """A name as Python's grammar reads it: a micro sign is a mu."""
+    return normalize("NFKC", name)
+
+
+def _unwritable(names: Iterable[str]) -> str:
+    """Which of some names no expression can have, for messages."""
+    found = [name for name in names if not name.isidentifier() or iskeyword(name)]
+    return f"; no expression can have the name {found[0]!r:.60}: expected letters, digits and _, no word of Python" if found else ""
 
 
 class _Reader:
@@ -103,10 +118,11 @@ class _Reader:
             return self._of(CONSTANTS[node.id])
         if node.id in _FUNCTIONS or node.id in _OF_LISTS:
             raise self._error(node, f"unknown symbol {node.id!r}; it is a function: expected {node.id}(...)")
-        known = [*self.symbols, *CONSTANTS]
+        every = _unwritable(self.symbols)
+        known = [name for name in (*self.symbols, *CONSTANTS) if not _unwritable([name])]
         close = get_close_matches(node.id, known, 1)
         hint = f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(known)}"
-        raise self._error(node, f"unknown symbol {node.id!r:.60}; {hint}")
+        raise self._error(node, f"unknown symbol {node.id!r:.60}; {hint}{every}")
 
     def _binary(self, node: ast.BinOp) -> Expression:
         left = self.value(node.left)

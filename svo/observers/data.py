@@ -29,7 +29,8 @@ def inputs_of(model: UncertainModel, name: str, u: ArrayLike | None, needed: boo
     if not needed or (u is None and size == 0):
         return np.zeros(size)
     if u is None:
-        why = ", since D or a D_i is not zero, or an uncertainty of B reaches the output" if name != "u" else ""
+        ways = "D or a D_i, an uncertainty of B, h of a nonlinear model, or jitter"
+        why = f", since y depends on it by {ways}" if name != "u" else ""
         raise ValueError(f"{name} is missing; expected shape ({size},){why}")
     array = floats(name, u)
     if array.shape != (size,):

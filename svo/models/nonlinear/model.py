@@ -17,6 +17,7 @@ from polytopes.value import Value
 from svo.checks import Array, expect, expect_kind, expect_shape, finite_array, is_count, positive_number, sizes
 from svo.functions.operations import Op
 from svo.functions.tape import Tape
+from svo.functions.text import as_read
 from svo.logs.log import Log
 from svo.models.draws import draw
 from svo.models.nonlinear.arguments import bounds_of, kept_of, names_of, varying_of
@@ -129,7 +130,7 @@ class NonlinearModel(Value, Shown):
         put("Ts", positive_number("Ts", self.Ts, "sampling time in seconds"))
         expect_kind("continuous", self.continuous, bool, "True or False")
         span = bounds_of(self.w, self.disturbances, self.parameters)
-        all_names = [*self.states, *self.inputs, *self.disturbances, *self.parameters]
+        all_names = [*map(as_read, [*self.states, *self.inputs, *self.disturbances, *self.parameters])]
         twice = next((name for name in all_names if all_names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"the name {twice!r} stands for two things; expected states, inputs and so on to differ")
@@ -150,6 +151,8 @@ class NonlinearModel(Value, Shown):
                 "largest is missing, and physical is not bounded; expected largest=(lower, upper): where the state is "
                 "when a set has to start again, which every later alarm then rests on"
             )
+        if self.valid_range is not None and not self.valid_range.cut(largest.lower, largest.upper)[2]:
+            raise ValueError("largest and valid have no common point; expected sets to start again where equations hold")
         put("start_range", beside(largest, known, n))
         put("physical_range", beside(self.physical_range, known, n))
         if self.valid_range is not None:

@@ -90,6 +90,8 @@ def fault_of(table: Table, kind: str, names: Mapping[str, Sequence[str]]) -> Act
     options: dict[str, Any] = {"magnitude": magnitude, "profile": Step()}
     if kind == "plant":
         arrays: dict[str, Any] = {name: table.array(name) for name in ARRAYS if name in table}
+        if not any(array.any() for array in arrays.values()):
+            raise table.error(None, f"changes nothing; expected at least one of {', '.join(ARRAYS)} that is not zero")
         direction = Uncertainty(**arrays)
         return PlantFault(direction=direction, **options | {"magnitude": table.number("magnitude")})
     if kind == "sensor":

@@ -121,11 +121,10 @@ def _numbers(table: Table) -> dict[str, Any]:
     """Each a number, or [lower, upper]."""
     found: dict[str, Any] = {}
     for name, value in table.content.items():
-        if not isinstance(value, list):
-            found[name] = table.number(name)
-            continue
-        ends = table.array(name)
-        if ends.shape != (2,):
+        ends = table.array(name) if isinstance(value, list) else np.array(table.number(name))
+        if ends.shape not in ((), (2,)):
             raise table.error(name, f"has shape {ends.shape}; expected a number, or [lower, upper]")
-        found[name] = tuple(ends.tolist())
+        if not np.isfinite(ends).all():
+            raise table.error(name, f"is {value}; expected finite numbers")
+        found[name] = tuple(ends.tolist()) if ends.ndim else float(ends)
     return found

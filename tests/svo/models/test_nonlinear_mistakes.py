@@ -75,7 +75,7 @@ OTHERS = {
     "-" * 6000 + "x": "nested too deeply",
     "x" + "+x" * 9000: "nested too deeply",
     "sin(" * 90 + "x" + ")" * 89: "never closed",
-    "9" * 10_000: "f, row x",
+    "9" * 10_000: "f, row x: a number has too many digits",
 }
 
 
@@ -95,6 +95,27 @@ def test_text_that_is_no_expression_is_one_error_within_a_second(text: str) -> N
     assert process_time() - begun < 1.0
     assert "f, row x" in str(caught.value)
     assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "why"),
+    [
+        ("if", "-if * x", "invalid syntax.*; no expression can have the name 'if': expected letters, digits and _"),
+        ("a b", "-a * x", "unknown symbol 'a'; expected one of x, u, pi; no expression can have the name 'a b'"),
+        ("2a", "-2a * x", "invalid .*; no expression can have the name '2a'"),
+        ("", "-a * x", "no expression can have the name ''"),
+        ("a[0]", "-a[0] * x", "is not allowed"),
+        ("\u00b5", "-\u00b5 * x", None),  # a micro sign, which Python's grammar reads as a mu
+        ("k\u00f6", "-ko\u0308 * x", None),
+    ],
+)
+def test_names_that_an_expression_can_have(name: str, text: str, why: str | None) -> None:
+    given = {"parameters": {name: 2.0}}
+    if why is None:
+        assert scalar(text, **given).flow.tape.values(np.array([3.0, 2.0, 0.0])).tolist() == [-6.0]
+        return
+    with pytest.raises(ValueError, match=why):
+        scalar(text, **given)
 
 
 @pytest.mark.parametrize("text", ["((x**64)**64)**64", "x**x**x", "x**1e9", "exp(exp(exp(exp(x))))", "x*x" * 1])
@@ -157,6 +178,8 @@ def test_a_function_that_cannot_be_traced_is_one_error(f, error, why) -> None:
         ({"w": 3}, ValueError, "w has shape"),
         ({"physical": 3}, ValueError, "physical is 3; expected"),
         ({"valid": ([9, 9], [0, 0])}, ValueError, "valid is between"),
+        ({"valid": ([0, 10], [20, 20])}, ValueError, "largest and valid have no common point"),
+        ({"inputs": ["\u00b5"], "disturbances": ["\u03bc"]}, ValueError, "the name '\u03bc' stands for two things"),
         ({"continuous": "no"}, TypeError, "continuous is a str; expected True or False"),
         ({"varying": 3}, TypeError, "varying is a int; expected a name, or a list of names"),
         ({"f": "h1"}, TypeError, "f is a str; expected a function"),
