@@ -70,8 +70,10 @@ def as_read(name: str) -> str:
 
 def _unwritable(names: Iterable[str]) -> str:
     """Which of some names no expression can have, for messages."""
-    found = [name for name in names if not name.isidentifier() or iskeyword(name)]
-    return f"; no expression can have the name {found[0]!r:.60}: expected letters, digits and _, no word of Python" if found else ""
+    wrong = next((name for name in names if not name.isidentifier() or iskeyword(name)), None)
+    if wrong is None:
+        return ""
+    return f"; no expression can have the name {wrong!r:.60}: expected letters, digits and _, no word of Python"
 
 
 class _Reader:

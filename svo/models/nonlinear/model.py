@@ -152,7 +152,7 @@ class NonlinearModel(Value, Shown):
                 "when a set has to start again, which every later alarm then rests on"
             )
         if self.valid_range is not None and not self.valid_range.cut(largest.lower, largest.upper)[2]:
-            raise ValueError("largest and valid have no common point; expected sets to start again where equations hold")
+            raise ValueError("largest and valid have no common point; expected sets to start where equations hold")
         put("start_range", beside(largest, known, n))
         put("physical_range", beside(self.physical_range, known, n))
         if self.valid_range is not None:

@@ -168,7 +168,7 @@ def test_an_alarm_of_other_equations_is_not_the_plants(tmp_path: Path, monkeypat
         ('{ hole = [0.0, 0.2] }', "{ hol = [0.0, 0.2] }", "faults.leak.parameters.*did you mean 'hole'"),
         ('{ hole = [0.0, 0.2] }', "{}", r"\[faults.leak\], key 'parameters': is missing"),
         ('type = "parameter"\nparameters = { h', 'type = "model"\nparameters = { h', "one of parameter, sensor"),
-        ('type = "parameter"\nparameters = { hole = [0.0, 0.2] }', 'type = "plant"\nmagnitude = 1.0', "changes nothing"),
+        ('"parameter"\nparameters = { hole = [0.0, 0.2] }', '"plant"\nmagnitude = 1.0', "leak.: changes nothing"),
         ("lower = [28.0, 10.0]", "lower = [28.0]", r"\[initial\]"),
         (re.findall(r"h1 = .*\nh2 = .*\n", TANKS)[0], "", r"key 'dynamics': is empty; expected at least one row"),
         ('h1 = "(pump', 'h3 = "(pump', r"unknown symbol 'h1'"),
