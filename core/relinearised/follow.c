@@ -1,9 +1,9 @@
 /* Samples of a nonlinear plant in a window, each linearised over the set that is known there.
  *
  * A window gives the set of a sample once it has read the sample, so the transition from it is written where the window
- * reads it at the next one. Besides what the window knows, a box of the newest state is carried along: what the
- * transition to it and its readings leave. All about the plant is in the user's units, all about the window in normal
- * form; units, powers of two, lead from one to the other.
+ * reads it at the next one. A box of the newest state is carried along: what the transition to it and its readings
+ * leave. The window's programs bound the state besides, where that is worth their time. All about the plant is in the
+ * user's units, all about the window in normal form; units, powers of two, lead from one to the other.
  */
 #include "tape/plant.h"
 #include "window/window.h"
@@ -18,6 +18,8 @@
 #define CARRIED(Y)                                                                                                   \
     Y(low, n) Y(high, n) Y(now, X *P) Y(now_noise, ny) Y(before, X *P) Y(before_noise, ny) Y(known_low, n)           \
     Y(known_high, n) Y(next_low, n) Y(next_high, n) Y(next, X *P)
+
+static const double SMALL = 0x1p-6; /* of the noise, of what moves a state: such a remainder is worth no programs */
 
 /* How samples end: the one after them is taken; it has no room for a basis of its transition, or of its box, which is
  * all that it lacks then; or there is no transition to it, or none but that, its output being not linearised. */
@@ -62,22 +64,82 @@ static int bound_newest(const window *w, const relinearised *r, double *low, dou
     return 1;
 }
 
+/* The same for the transition from it. What was asked for at samples that had none of these programs leaves no trace:
+ * bases go on from those of the sample before, or from nothing. */
+static int bound_for_transition(const window *w, const relinearised *r)
+{
+    const integer time = w->clock[TIME];
+    if (w->clock[LINEARISED] != time)
+        for (integer q = 0; q < 2 * w->n; q++) forget_basis(w, 2 * w->nt + q);
+    w->clock[LINEARISED] = time;
+    if (!bound_newest(w, r, r->known_low, r->known_high)) return 0;
+    w->clock[LINEARISED] = time + 1;
+    return 1;
+}
+
+/* Whether what the transition from sample k leaves out is small beside all else that moves the state. */
+static int is_transition_sharp(const window *w, const relinearised *r, integer k)
+{
+    const integer n = w->n, nw = w->nw;
+    const double *row = w->stack + slot(w, k) * w->X * w->P + n + w->nu + 1;
+    int is = 1;
+    for (integer i = 0; i < n; i++, row += w->P) {
+        double moved = 0.0;
+        for (integer j = 0; j < nw; j++) moved += fabs(row[j]) * (r->w_high[j] - r->w_low[j]);
+        const integer own = nw - n + i;
+        is &= fabs(row[own]) * (r->w_high[own] - r->w_low[own]) <= SMALL * moved;
+    }
+    return is;
+}
+
+/* The same of the newest sample's output beside its noise. */
+static int is_output_sharp(const window *w, const relinearised *r)
+{
+    int is = 1;
+    plant p;
+    plant_open(&p, r->plant, (Memory){r->scratch, 0});
+    for (integer j = 0; j < w->ny; j++) is &= r->now_noise[j] <= (1.0 + SMALL) * p.noise[j];
+    return is;
+}
+
+/* The transition from what is known of the newest sample; whether there is one. */
+static int is_moved(const window *w, const relinearised *r, const double *u, double T, outcome *why)
+{
+    const integer size = w->X * w->P;
+    copy(r->next_low, r->low, w->n);
+    copy(r->next_high, r->high, w->n);
+    copy(r->next, r->now, size);
+    if (fdi_plant_moved(r->plant, r->scratch, r->known_low, r->known_high, r->next_low, r->next_high, u, T, r->next, why))
+        return 0;
+    double *stack = w->stack + slot(w, w->clock[TIME]) * size;
+    for (integer j = 0; j < w->n * w->P; j++) stack[j] = r->next[j] * r->stack[j];
+    return 1;
+}
+
+/* The same without programs; whether it is there and sharp, so that they would leave the window's sets as they are.
+ *
+ * It is tried where the last one was: not where readings tell of w more than its bounds do. */
+static int is_moved_sharply(const window *w, const relinearised *r, const double *u, double T, outcome *why)
+{
+    const integer time = w->clock[TIME];
+    copy(r->known_low, r->low, w->n);
+    copy(r->known_high, r->high, w->n);
+    return !w->late && time > w->clock[BASE] && is_transition_sharp(w, r, time - 1) && is_output_sharp(w, r) &&
+           is_moved(w, r, u, T, why) && is_transition_sharp(w, r, time);
+}
+
 /* The transition from the newest sample, over a time T, where the window reads it. */
 static integer move(const window *w, const relinearised *r, const double *u, double T, outcome *why)
 {
-    const integer n = w->n, size = w->X * w->P;
-    if (!bound_newest(w, r, r->known_low, r->known_high)) return WITHOUT_ROOM;
-    copy(r->next_low, r->low, n);
-    copy(r->next_high, r->high, n);
-    copy(r->next, r->now, size);
-    if (fdi_plant_moved(r->plant, r->scratch, r->known_low, r->known_high, r->next_low, r->next_high, u, T, r->next, why))
-        return NOT_MOVED;
+    const integer n = w->n;
+    if (!is_moved_sharply(w, r, u, T, why)) {
+        if (!bound_for_transition(w, r)) return WITHOUT_ROOM;
+        if (!is_moved(w, r, u, T, why)) return NOT_MOVED;
+    }
     copy(r->low, r->next_low, n);
     copy(r->high, r->next_high, n);
-    copy(r->before, r->next, size);
+    copy(r->before, r->next, w->X * w->P);
     copy(r->before_noise, r->now_noise, w->ny);
-    double *stack = w->stack + slot(w, w->clock[TIME]) * size;
-    for (integer j = 0; j < n * w->P; j++) stack[j] = r->before[j] * r->stack[j];
     return TAKEN;
 }
 
@@ -128,6 +190,16 @@ static int cut_arrival(const window *w, const relinearised *r)
         w->new_upper[j] = smaller(w->new_upper[j], r->physical_high[j]);
     }
     return 1;
+}
+
+/* `move`, of a sample that a caller takes by himself; u (nu,) in the user's units. */
+EXPORTED integer fdi_relinearised_move(void *block, const double *plant, const double *units, double *carried,
+                                       double *scratch, const double *u, double T, integer limit, outcome *why)
+{
+    window w;
+    window_open(&w, block);
+    const relinearised r = opened(&w, plant, units, carried, scratch, limit);
+    return move(&w, &r, u, T, why);
 }
 
 /* Take samples 0, 1, ... < count until one is not simply consistent, of which the caller concludes the rest.

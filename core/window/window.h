@@ -33,7 +33,7 @@ enum { CONSISTENT, EMPTY_CANDIDATE, UNDECIDED, FULL }; /* verdict of a task's pr
 enum { ARRIVAL, NEWEST, CHANNELS, QUERY };         /* tasks */
 enum { FINE, SIGN_OPEN, BAD_INPUT, BAD_OUTPUT, BAD_MATRIX, RANK_ROSE, OUTGROWN };  /* what came of a sample */
 enum { BASE, TIME, PENDING, STARTED, PIVOTS, STOPS, PROGRAMS, REFACTORED, CAPPED, STAGE, NEXT, /* of the clock */
-       WAITING, PROGRAM, HAS_POINT, CLOCK };
+       WAITING, PROGRAM, HAS_POINT, LINEARISED, CLOCK };
 enum { IDLE, ENTERED, MOVED, COMPLETED };          /* stages of a sample that waits for room */
 enum { SCRATCH, KEPT };                            /* whether an array is part of a saved window */
 enum { KIND_double, KIND_integer, KIND_breakpoint }; /* of the entries of an array */
@@ -67,7 +67,8 @@ typedef struct { double ratio, size, drop; integer who; } breakpoint;
 #define ARRAYS(Y)                                                                                                    \
     /* base, newest sample, whether arrival bounds wait for the slide, whether there is a sample; counts; whether */ \
     /* bases cannot have more room; stage of a sample that waits for it, and its next channel program; the task that */ \
-    /* waits for it + 1, the program that does, whether one before it has a point */                                 \
+    /* waits for it + 1, the program that does, whether one before it has a point; 1 + the newest sample whose state */ \
+    /* was bounded for its linearisation */                                                                          \
     Y(integer, KEPT, clock, CLOCK)                                                                                   \
     /* the program: rows of z, also by columns, their bounds, and 2 (sum |G| + |bound|) + 1 */                       \
     Y(double, KEPT, G, R, Z)                                                                                         \

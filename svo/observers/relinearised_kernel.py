@@ -14,6 +14,9 @@ from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
 from svo.models.nonlinear.plant_kernel import PlantKernel
 from svo.observers.window_kernel import UNLIMITED, told
 
+_move = native.function(
+    "fdi_relinearised_move", *[Address] * 2, Given, *[Address] * 2, Given, Real, Integer, Address, returns=Integer
+)
 _follow = native.function(
     "fdi_relinearised_follow", *[Address] * 2, Given, *[Address] * 2, Integer, *[Given] * 4, Real, Integer,
     *[Address] * 3, returns=Integer,
@@ -118,6 +121,16 @@ def units_of(form: NormalForm) -> Array:
     ends = (-infinite, infinite) if physical is None else (physical.lower, physical.upper)
     factor = form.exponents.factor.ravel()
     return np.concatenate([form.x, factor, 1.0 / form.u, 1.0 / form.y, w_lower, w_upper, *ends])
+
+
+def move(
+    window: int, plant: PlantKernel, units: Array, carried: Carried, u: Array, T: float
+) -> tuple[int, Undecided | None]:
+    """The transition from the newest sample over a time T, where a window reads it: how it ends, why there is none."""
+    end = _move(
+        window, plant.address, units, carried.address, native.scratch(plant.room), u, T, UNLIMITED, carried.to_result[1]
+    )
+    return end, plant.undecided(carried.why) if end == NOT_MOVED else None
 
 
 def follow(

@@ -28,9 +28,6 @@ _cut = native.function("fdi_plant_cut", Address, Address, *[Entries] * 2, Given,
 _measured = native.function(
     "fdi_plant_measured", Address, Address, *[Entries] * 2, *[Given] * 2, *[Entries] * 3, returns=Integer
 )
-_moved = native.function(
-    "fdi_plant_moved", Address, Address, *[Given] * 2, *[Entries] * 2, Given, Real, *[Entries] * 2, returns=Integer
-)
 _path = native.function("fdi_plant_path", Address, Address, *[Given] * 3, Real, Integer, Entries, returns=Integer)
 
 # As in `core/tape/plant.h`.
@@ -155,22 +152,6 @@ class PlantKernel:
         if _measured(self.address, native.scratch(self.room), *left, y, u, found.rows[n:], found.n, told):
             raise self.undecided(told, is_output=True)
         return found, left
-
-    def moved(self, at: Linearisation, known: Span, box: Span, u: Array, T: float) -> tuple[Linearisation, Span]:
-        """A sample with the transition from it, over a time T, and bounds of the next state.
-
-        From the states that are in both boxes; in the first, if none is in both: only the window's programs raise an
-        alarm.
-
-        Raises
-        ------
-        Undecided
-            As `transition`.
-        """
-        rows, left, told = at.rows.copy(), Span(box.lower.copy(), box.upper.copy()), np.empty(8)
-        if _moved(self.address, native.scratch(self.room), *known, *left, u, T, rows, told):
-            raise self.undecided(told)
-        return Linearisation(rows, at.n, at.nu), left
 
     def cut(self, known: Span, y: Array, output: LinearOutput) -> Span | None:
         """What readings leave of a box for which an output holds; None where nothing is left: a program decides."""

@@ -25,6 +25,7 @@ from svo.observers.base import Observer, Seen, Step
 from svo.observers.data import relative_slack
 from svo.observers.first_states import first_box
 from svo.observers.given_units import arrival_in, arrival_out
+from svo.observers.readings import OUTGROWN
 from svo.observers.relinearised_kernel import NOT_MEASURED, NOT_MOVED, Followed, PlantSamples
 from svo.observers.saved_state import arrays_of, numbers
 from svo.observers.window.evidence import ArrivalSet
@@ -394,11 +395,11 @@ class WindowObserver(Observer):
     def _relinearise(self, plant: Relinearised, u: Array, dt: float | None) -> None:
         """Hand over the transition from the newest sample; where there is none, the set starts again."""
         try:
-            rows = self._sampler.relinearised(None if self._known.lost else self._known.bounds(), u, dt)
+            if self._known.lost:
+                raise Undecided(OUTGROWN)
+            self._window.move_relinearised(plant, u, dt)
         except Undecided as error:
             self._start_from_largest(plant, error)
-        else:
-            self._window.move_by(rows)
 
     def _start_from_largest(self, plant: Relinearised, why: Undecided) -> None:
         """Nothing else is known of a sample to which there is no transition."""

@@ -16,7 +16,16 @@ from svo.checks import Array
 from svo.logs.log import Log
 from svo.models import NormalForm
 from svo.models.nonlinear import Linearisation, NonlinearModel, Span, Undecided
-from svo.observers.relinearised_kernel import NOT_MOVED, WITHOUT_ROOM, Carried, Followed, PlantSamples, follow, units_of
+from svo.observers.relinearised_kernel import (
+    NOT_MOVED,
+    WITHOUT_ROOM,
+    Carried,
+    Followed,
+    PlantSamples,
+    follow,
+    move,
+    units_of,
+)
 from svo.observers.saved_state import numbers
 
 _MEASURED = ("C", "c", "F", "n")  # what a sample has without a transition
@@ -72,8 +81,8 @@ class Relinearised:
         self._carried.now.rows[:], self._carried.now.n[:] = now.rows, now.n
         self._has_now = True
 
-    def moved(self, known: Span, u: Array, dt: float | None) -> Linearisation:
-        """The newest sample with the transition from it, whose states are in a box that the window knows.
+    def move(self, window: int, u: Array, dt: float | None) -> bool:
+        """The transition from the newest sample, where a window reads it; whether its bases had room.
 
         It takes ``dt`` seconds; None = the model's ``Ts``.
 
@@ -84,12 +93,13 @@ class Relinearised:
         """
         self.reason = None
         assert self.now is not None
-        kernel, T = self.model.kernel, dt or self.model.Ts
-        found, box = kernel.moved(self.now, known, self.box, u, T)
-        self.start_from(box)
-        self._carried.before.rows[:], self._carried.before.n[:] = found.rows, found.n
+        end, why = move(window, self.model.kernel, self._units, self._carried, u, dt or self.model.Ts)
+        if why is not None:
+            raise why
+        if end == WITHOUT_ROOM:
+            return False
         self._has_before = True
-        return found
+        return True
 
     def give_up(self, why: Undecided, sample: int) -> Span:
         """The box from which the set starts again where a transition to a sample is not enclosed."""

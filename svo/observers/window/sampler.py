@@ -15,9 +15,8 @@ from svo.checks import Array
 from svo.logs.log import Log
 from svo.models import UncertainModel
 from svo.models.intervals import check_splits, transition_rows
-from svo.models.nonlinear import NonlinearModel, Span, Undecided
+from svo.models.nonlinear import NonlinearModel, Span
 from svo.models.recent_inputs import RecentInputs
-from svo.observers.readings import OUTGROWN
 from svo.observers.relinearised_kernel import PlantSamples
 from svo.observers.stamped import Stamped
 from svo.observers.window.evidence import ArrivalSet
@@ -123,21 +122,6 @@ class Sampler:
     def rows_of(self, dt: float | None) -> Array:
         """Rows of the transition of a linear model in ``dt`` seconds; None = ``Ts``."""
         return self._form.state_rows(transition_rows(self.linear, dt))
-
-    def relinearised(self, bounds: tuple[Array, Array] | None, u: Array, dt: float | None) -> Array:
-        """Rows of the transition of a nonlinear model, by what the window knows of the state; None is nothing.
-
-        Raises
-        ------
-        Undecided
-            If there are none.
-        """
-        if bounds is None:
-            raise Undecided(OUTGROWN)
-        assert self.plant is not None
-        at = self.plant.moved(self._span(bounds), u, dt)
-        rows: Array = self._normal.stack(at)[:, : self._normal.n_states]
-        return rows
 
     def move_stamped(self, bounds: tuple[Array, Array], u: Array, dt: float | None) -> None:
         """Carry on what is known of the state of a model with stamps that may be off."""

@@ -149,6 +149,11 @@ class Window:
         done, told = kernel.follow(memory.address, samples, eps, kernel.UNLIMITED, boxes)
         return done, memory.go_on(told, eps)
 
+    def move_relinearised(self, plant: Relinearised, u: Array, dt: float | None) -> None:
+        """The transition of a nonlinear plant from the newest sample, as `Relinearised.move`."""
+        while not plant.move(self.memory.address, u, dt):
+            self.memory.enlarge(2 * self.memory.size.K)
+
     def take_relinearised(self, plant: Relinearised, samples: PlantSamples, boxes: Array | None) -> Followed:
         """As `take_many`, of a nonlinear plant; the sample after them is not taken where it is not linearised."""
         memory, eps = self._begun(), self.settings.eps

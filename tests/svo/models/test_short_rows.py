@@ -10,8 +10,9 @@ import pytest
 
 from svo import NonlinearModel
 from svo.checks import Array
-from svo.models.nonlinear import Linearisation, Span, Undecided
+from svo.models.nonlinear import Span, Undecided
 from tests.svo.models.nonlinear_plants import CASES, Case
+from tests.svo.models.short_transition import moved
 
 SEED = 20_261_129
 GROWTH = 1.02  # of remainders: 2^-6 for digits, 2^-8 for those of their own
@@ -45,13 +46,12 @@ def digits(values: Array) -> int:
 def test_what_short_transitions_drop_is_in_their_remainder(name: str) -> None:
     case, rng = CASES[name](), np.random.default_rng(SEED)
     model, n = case.model, len(case.x0)
-    w, nw, nu = model.flow.w, len(model.flow.varying), model.n_inputs
+    w, nw = model.flow.w, len(model.flow.varying)
     written, all_of_them = 0, 0
     for box, u in boxes(case, rng):
         try:
             long = model.kernel.transition(*box, u, model.Ts)
-            empty = Linearisation.empty(n, nw, model.n_outputs, nu)
-            short, _ = model.kernel.moved(empty, box, box, u, model.Ts)
+            short, _ = moved(model, box, box, u)
         except Undecided:
             continue
         E, R = short.E[:, :nw], np.diag(short.E[:, nw:])
@@ -97,7 +97,7 @@ def test_what_is_exact_keeps_its_digits(power: int) -> None:
         Ts=1.0, n=0.1 * unit, largest=([-2e9 * unit] * 2, [2e9 * unit] * 2),
     )  # fmt: skip
     box = Span(np.array([-1.0, 1.0]) * unit, np.array([0.5, 3.0]) * unit)
-    short, _ = model.kernel.moved(Linearisation.empty(2, 0, 1, 0), box, box, np.zeros(0), 1.0)
+    short, _ = moved(model, box, box, np.zeros(0))
     assert (short.A == [[0.3, 0.1], [0.0, 0.7]]).all()
     assert (np.diag(short.E) <= 1e-13 * unit).all()
 
@@ -113,7 +113,7 @@ def test_a_box_without_an_inside_keeps_its_digits() -> None:
         largest=([-9], [9]),
     )
     box = Span(np.array([0.7]), np.array([0.7]))
-    short, _ = model.kernel.moved(Linearisation.empty(1, 0, 1, 0), box, box, np.zeros(0), 1.0)
+    short, _ = moved(model, box, box, np.zeros(0))
     long = model.transition([0.7], [0.7])
     exact_value = Fraction(0.7) ** 2 / 3
     said = Fraction(float(short.A[0, 0])) * Fraction(0.7) + Fraction(float(short.a[0]))
