@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from polytopes.box import both_ways
 from polytopes.checks import Floats
 from polytopes.double_description import Integers
 from polytopes.errors import EmptySetError, UnboundedError, UndecidedError
@@ -112,8 +113,12 @@ def rows_of_fractions(V: Any, rays: Any) -> Table:
 
 
 def exact_hull(V: Floats) -> Table | None:
-    """Rows A, b, C, d of the hull of points (k, n) of few bits that span the space, exact; else None."""
-    return _table(short_hull(V))
+    """Rows A, b, C, d of the hull of points (k, n) of few bits, or of any numbers (k, 1), exact; None if it is flat."""
+    if V.shape[1] > 1:
+        return _table(short_hull(V))
+    numbers = V.ravel().tolist()
+    low, high = min(numbers), max(numbers)
+    return (both_ways(1), np.array([high, 0.0 - low]), *no_equalities(1)) if low < high else None
 
 
 def _table(rows: Floats | None) -> Table | None:
@@ -131,8 +136,9 @@ def hull_and_vertices(V: Floats, rays: Floats) -> tuple[Table, Callable[[], Exac
     In integers where the numbers are short, where there are rays, and where the points are flat; the rows are exact if
     they are floats, and outward else.
     """
-    few_bits = are_short(V)
-    known = exact_hull(V) if few_bits and not len(rays) else None
+    on_a_line = V.shape[1] == 1
+    few_bits = not on_a_line and are_short(V)
+    known = exact_hull(V) if (few_bits or on_a_line) and not len(rays) else None
     if known is not None:
         return known, lambda: among(distinct(_homogeneous(V)), integer_form(*known))
     unit = 0 if few_bits else short_unit(V)

@@ -112,10 +112,7 @@ def _shadow_at_once(P: Rows, keep: list[int]) -> Table | None:
         lower, upper = P.as_box.corners[:, keep]
         return *box_rows(lower, upper), *no_equalities(len(keep))
     if P.corners is not None and P.corners.exact and len(P.corners.points) <= _FEW_CORNERS:
-        if len(keep) > 1:
-            return exact_hull(P.corners.points[:, keep])
-        values = P.corners.points[:, keep[0]].tolist()
-        return both_ways(1), np.array([max(values), 0.0 - min(values)]), *no_equalities(1)
+        return exact_hull(P.corners.points[:, keep])
     return None if len(keep) > 1 or P.prepared is None or P.short else _ends(P.prepared, P.dim, keep[0])
 
 

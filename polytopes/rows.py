@@ -87,6 +87,9 @@ class Rows(Value):
             own["A"], own["b"] = arrays(self.in_core)
             return own[name]
 
+        def __dir__(self) -> list[str]:
+            return [*super().__dir__(), "A", "b"]
+
     def __reduce__(self) -> tuple[type[Self], Table]:
         return type(self), self.table  # what is derived from them is derived again
 

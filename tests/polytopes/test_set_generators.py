@@ -60,3 +60,12 @@ def test_a_cone_and_a_wedge_from_rays() -> None:
     assert plane.equals(HPolytope(np.empty((0, 3)), [], [[0.0, 0.0, 1.0]], [1.0]))
     with pytest.raises(ValueError, match="rays has shape"):
         HPolytope.from_vertices([[0.0, 0.0]], rays=[[1.0, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize("numbers", [[0.1, 0.3, 0.2], [1e300, -1e300], [5e-324, -0.0], [2.0**-40, 3.0]])
+def test_the_hull_of_any_numbers_is_the_segment_between_the_least_and_the_largest(numbers: list[float]) -> None:
+    P = HPolytope.from_vertices(np.array(numbers)[:, None])
+    assert P.A.tolist() == [[1.0], [-1.0]]
+    assert P.b.tolist() == [max(numbers), -min(numbers)]
+    assert P.vertices().ravel().tolist() == sorted([min(numbers), max(numbers)])
+    assert {"A", "b"} <= set(dir(P))
