@@ -37,9 +37,8 @@ from svo.detection.plant_record import plant_record
 from svo.logs.csv import write_csv
 from svo.logs.log import Log
 from svo.observers.base import Observer
+from svo.observers.window.chain import prover_of
 from svo.observers.window.chain_starts import own_start
-from svo.observers.window.log_model import ModelOnLog
-from svo.observers.window.prover import ChainProver
 from svo.plant.description.simulated import simulated_plant
 
 CHECKER = Path(__file__).parents[1] / "checker" / "svo_check.py"
@@ -104,8 +103,8 @@ def random_run(seed: int) -> dict[str, Any]:
         assert first is not None
         at = observer.run(bad).falsified_at
         if at is not None:
-            of, begun = ModelOnLog(model, first, bad), process_time()
-            found = ChainProver(of, 0, own_start(None, first)).prove(at)
+            begun = process_time()
+            found = prover_of(observer, first, bad, 0, own_start(None, first)).prove(at)
             row[name] = {"start": None if found is None else found.start.kind, "s": process_time() - begun}
             row[name]["before"] = None if found is None else at - found.start.sample
     return row

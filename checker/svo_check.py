@@ -17,7 +17,8 @@ import math
 import re
 import sys
 import time
-from itertools import pairwise, zip_longest
+from collections import defaultdict
+from itertools import pairwise, product, zip_longest
 from pathlib import Path
 
 FLOAT = re.compile(r"(?:-?0x[01](?:\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|0|nan|-?inf)")
@@ -25,7 +26,6 @@ FLOATS = re.compile(rf"(?:{FLOAT.pattern}(?: {FLOAT.pattern})*+)?")
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 MOST_UNPACKED, MOST_TIMES, MOST_SIZE = 1 << 19, 50, 1 << 10  # bytes; times the file's; states, inputs, ...
 LONGEST = 1 << (1 << 18)  # of a window's integers
-SIDES = {"upper": 1, "lower": -1}
 STARTS = {
     "first": "the first set of the model holds the state at sample 0",
     "readings": "the model holds from sample {0} on, where the readings alone say where the state is",
@@ -98,11 +98,6 @@ def array(record, *shape):  # a nested list of floats; a None in the shape is an
     return values
 
 
-def stated(step, where, name, width):  # places with their row of an array; none where the step has none
-    places = step.get(where, [])
-    return zip(places, array(step[name], len(places), width) if places else [], strict=True)
-
-
 def count(value, least=0, end=2**53):
     expect(type(value) is int and least <= value < end, f"expected an integer from {least} to below {end}")
     return value
@@ -165,14 +160,12 @@ class Set:  # {x : box[0] <= x <= box[1], ends[0] <= rows x <= ends[1]}
 
     def least(self, g, multipliers=()):  # of g x, less the multiplied rows
         total = num(0.0)
-        for m, row, *ends in zip(multipliers, self.rows, *self.ends, strict=True):
+        for m, row, *ends in zip(multipliers or [0.0] * len(self.rows), self.rows, *self.ends, strict=True):
             if m:
                 total -= num(m) * num(ends[m > 0])
                 g += num(m) * Vec.of(row)
-        for i, (x, *ends) in enumerate(zip(g.m, *self.box, strict=True)):
-            if x:
-                total += g[i : i + 1] * num(ends[x < 0])  # an end that is not there is no finite number
-        return total
+        box = [*enumerate(zip(g.m, *self.box, strict=True))]  # an end that is not there is no finite number
+        return sum((g[i : i + 1] * num(ends[x < 0]) for i, (x, *ends) in box if x), total)
 
     def expect_point(self, what):  # each row looked at alone; of what is empty a proof says nothing
         pairs = [pair for both in (self.box, self.ends) for pair in zip(*both, strict=True)]
@@ -206,10 +199,9 @@ class Model:  # an observer's: the numbers of plant.json alone, never those of a
         self.physical, self.largest = (None if r is None else Set([array(end, n) for end in r]) for r in ranges)
         self.always = self.physical or Set([[-math.inf] * n, [math.inf] * n])
         self._expect_points()
-        self.is_scheduled = self._points is not None or len(self._stacks) > 1
+        self._known, self.is_scheduled = {}, self._points is not None or len(self._stacks) > 1
         self.premises = ["the state never leaves the physical range of the model"] * (self.physical is not None)
         self.premises += ["the model file has the right matrices of each sample: an AXIOM"] * self.is_scheduled
-        self._known = {}
 
     def _expect_points(self):
         for k in range(max(map(len, (*self._bounds, self._remainder)))):
@@ -227,14 +219,16 @@ class Model:  # an observer's: the numbers of plant.json alone, never those of a
     def bounds(self, k):  # noise, lower and upper w, and remainder of the output of a sample
         return [each[0 if len(each) == 1 else k] for each in (*self._bounds, self._remainder)]
 
-    def stack(self, k):  # of a sample: items of rows of floats; the first one as integers times a power of two
-        k = k if self.is_scheduled else 0
-        if k not in self._known:
+    def stack(self, k, vertex=()):  # items of rows of floats; the first one, its states' rows at a Delta, as integers
+        k, at = (k if self.is_scheduled else 0), (k * self.is_scheduled, vertex)
+        if at not in self._known:
             floats = self._stacks[0 if len(self._stacks) == 1 else k] if self._points is None else self._at(k)
             flat = Vec.of([v for row in floats[0] for v in row])
+            for delta, item in zip(vertex, floats[1:] if vertex else (), strict=True):
+                flat += num(delta) * Vec.of([v * (i < self.n) for i, row in enumerate(item) for v in row])
             rows = [flat.m[i : i + self.columns] for i in range(0, len(flat.m), self.columns)]
-            self._known[k] = floats, rows, flat.e
-        return self._known[k]
+            self._known[at] = floats, rows, flat.e
+        return self._known[at]
 
     def _at(self, k):  # linear interpolation, five operations in doubles; the nearest end beyond the points
         points, s = self._points, self._schedule[k]
@@ -248,139 +242,147 @@ class Model:  # an observer's: the numbers of plant.json alone, never those of a
 
 class Chain:  # what follows, step by step, about one observer's model
     def __init__(self, model, log, claimed):
-        self.model, self.log, self.claimed, self.start, self.directions, self.checked = model, log, claimed, None, [], 0
+        self.model, self.log, self.claimed, self.start, self.directions, self.checked = model, log, claimed, None, {}, 0
         self.bounds, self.channels, self.premises = {}, {}, []
         self._sample = lambda value: count(value, 0, claimed + 1)  # nothing after it is used
 
     def take(self, step):
         kind = step["step"]
         if kind in ("start", "channels"):
-            (self._start if kind == "start" else self._channels)(step)
+            self._start(step) if kind == "start" else self._choose(self._sample(step["sample"]), step)
         elif kind in ("s", "x"):
-            k, side, value = self._sample(step["sample"]), SIDES[step["side"]], real(step["value"])
+            k, side, value = self._sample(step["sample"]), {"upper": 1, "lower": -1}[step["side"]], real(step["value"])
             which = count(step["channel" if kind == "s" else "row"])
-            self._bounded(step, value, k, (self.channels[k][2] if kind == "s" else self.directions)[which], side)
+            self._bounded(step, value, k, (self.channels[k][2] if kind == "s" else self.directions[k])[which], side)
             (self.channels[k][4] if kind == "s" else self.bounds)[k, which, side] = value
+        elif kind == "directions":  # of one sample, in the place of the template
+            self.directions[k := self._sample(step["sample"])][self.model.n :] = array(step["rows"], None, self.model.n)
+            self.bounds = {at: value for at, value in self.bounds.items() if at[0] != k}
         else:
             expect(kind == "alarm", "no step of a known kind")
-            expect(self._total(step).m[0] > 0, "the multipliers do not prove that the window is empty")
+            expect(all(total.m[0] > 0 for total in self._cases(step)), "the multipliers do not prove an empty window")
         self.checked += 1
 
     def _start(self, step):  # everything before is forgotten
         k, kind, model = self._sample(step["sample"]), step["from"], self.model
         expect(kind in STARTS and (k == 0 or kind != "first"), "no known start, or a first set after sample 0")
-        self.bounds, self.channels = {}, {}
         axes = [[float(i == j) for j in range(model.n)] for i in range(model.n)]
-        self.directions = axes + array(step["template"], None, model.n)
-        if kind in ("readings", "assumed"):
-            found = self._read(step, k) if kind == "readings" else Set.read(step["set"], model.n)
-        else:
-            found = getattr(model, kind)
+        template = array(step["template"], None, model.n)
+        self.bounds, self.channels, self.directions = {}, {}, defaultdict(lambda: axes + template)
+        found = self._read(step, k) if kind == "readings" else getattr(model, kind, None)
+        if kind == "assumed":
+            (found := Set.read(step["set"], model.n)).within(model.always).expect_point("the set that is assumed")
         expect(found is not None, f"the model has no {kind} set")
         self.start = k, found.within(model.always)
-        if kind == "assumed":
-            self.start[1].expect_point("the set that is assumed")
         box = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in zip(*found.box, strict=True))
         rows = zip(found.rows, *found.ends, strict=True)
         box += "".join(f"; {row} x: {low:.6g} to {high:.6g}" for row, low, high in rows)
         self.premises = [STARTS[kind].format(k, box), *model.premises]
 
-    def _read(self, step, k):
-        """The box that readings prove wherever x is: |x| <= t X with t > 1 implies |x| < t X, and |x| <= X the box."""
+    def _read(self, step, k):  # wherever x is: |x| <= t X, t > 1, implies |x| < t X, and |x| <= X the box
         box = [array(step[end], self.model.n) for end in ("lower", "upper")]
         wide = [up(READ_WITHIN * size) for size in largest(*box)]
         self.start = k, Set([[-v for v in wide], wide])
         for i, rows in enumerate(array(step["inverse"], self.model.n, None, self.model.ny)):
             window = {"first": k, "last": k + len(rows) - 1, "on_start": {"shape": [0], "hex": ""}}
             for end, side in zip(box, (-1, 1), strict=True):
-                self._bounded(window, end[i], k, self.directions[i], side, [[side * m for m in row] for row in rows])
+                self._bounded(window, end[i], k, self.directions[k][i], side, [[side * m for m in row] for row in rows])
         return Set(box)
 
     def _set(self, k):  # what is proven of the state at a sample; infinite ends where nothing is
         expect(self.start is not None and k >= self.start[0], "a step is about samples before its set starts")
         if k == self.start[0]:
             return self.start[1]
-        n, rows = self.model.n, range(len(self.directions))
-        ends = [[self.bounds.get((k, row, side), side * math.inf) for row in rows] for side in (-1, 1)]
-        return Set([e[:n] for e in ends], self.directions[n:], [e[n:] for e in ends]).within(self.model.always)
+        n, rows = self.model.n, self.directions[k]
+        ends = [[self.bounds.get((k, row, side), side * math.inf) for row in range(len(rows))] for side in (-1, 1)]
+        return Set([e[:n] for e in ends], rows[n:], [e[n:] for e in ends]).within(self.model.always)
 
-    def _channels(self, step):  # factors at a sample; bounds of the s of other factors are none of these
-        model, k = self.model, self._sample(step["sample"])
-        owner = [count(i, 1, 1 + len(model.delta)) for i in step["owner"]]
-        gain = array(step["gain"], len(owner), model.rows)
-        functional = array(step["functional"], len(owner), model.columns)
-        self._choose(k, owner, gain, functional)
-
-    def _choose(self, k, owner=(), gain=(), functional=()):  # and what they leave out, by entries, rounded up
-        found = {}
-        for item, ends in enumerate(self.model.delta, start=1):
-            for i, row in enumerate(self.model.stack(k)[0][item]):
+    def _choose(self, k, step=None):  # factors, if any, and what they leave out, by entries, rounded up
+        model, found = self.model, {}
+        owner = [count(i, 1, 1 + len(model.delta)) for i in (step["owner"] if step else ())]
+        sizes = (("gain", model.rows), ("functional", model.columns))
+        gain, functional = (array(step[name], len(owner), size) if step else () for name, size in sizes)
+        for item, ends in enumerate(model.delta, start=1):
+            for i, row in enumerate(model.stack(k)[0][item]):
                 rest = Vec.of(row)
                 for q in (q for q, of in enumerate(owner) if of == item and gain[q][i]):
                     rest -= num(gain[q][i]) * Vec.of(functional[q])
                 for j in (j for j, m in enumerate(rest.m) if m):
                     size = up(abs(rest.m[j] << max(rest.e, 0)) / (1 << max(-rest.e, 0)))
                     found[i, j] = up(found.get((i, j), 0.0) + up(size * max(map(abs, ends))))
-        self.channels[k] = owner, gain, functional, found, {}  # and bounds of s
+        self.channels[k] = owner, gain, functional, found, {}  # and bounds of s: of others' none are known
         return self.channels[k]
 
     def _bounded(self, step, value, k, direction, side, on_output=None):  # direction'(x, u, 1, w) at a sample, by value
-        whole = direction + [0.0] * (self.model.columns - len(direction))
-        total = self._total(step, k, Vec.of([side * v for v in whole]), on_output)
-        expect((total + num(side * value)).m[0] >= 0, f"a bound of sample {k} is not proven")
+        whole = [side * v for v in direction] + [0.0] * (self.model.columns - len(direction))
+        totals = self._cases(step, k, Vec.of(whole), on_output)
+        expect(all((total + num(side * value)).m[0] >= 0 for total in totals), f"a bound of sample {k} is not proven")
 
-    def _total(self, step, at=None, objective=None, on_output=None):  # least of rows less bounds, and less objective
+    def _cases(self, step, *of, vertex=()):  # totals: of both signs of an s; of Delta's vertices before a sample
+        if "split" in step:
+            (k, q), kept = step["split"], self.channels
+            for side, case in zip((1, -1), step["cases"], strict=True):
+                self.channels = kept | {k: (*kept[k][:4], kept[k][4] | {(k, q, side): 0.0})}
+                yield from self._cases(case, *of, vertex=vertex)
+            self.channels = kept
+        elif "vertices" in step:
+            moved = [any(map(any, item[: self.model.n])) for item in self.model.stack(of[0] - 1)[0][1:]]
+            deltas = product(*(ends[: 1 + m] for ends, m in zip(self.model.delta, moved, strict=True)))
+            for vertex, case in zip(deltas, step["vertices"], strict=True):
+                yield from self._cases(case, *of, vertex=vertex)
+        else:
+            yield self._total(step, *of, vertex=vertex)
+
+    def _total(self, step, at=None, objective=None, on_output=None, vertex=()):  # least of rows, bounds, objective
         model, n, nu = self.model, self.model.n, self.model.nu
         first, last = self._sample(step["first"]), self._sample(step["last"])
         length = last - first + 1
         expect(length > 0 and (at is None or first <= at <= last), "a window's samples are out of order")
         on_output, lines = on_output or array(step["on_output"], length, model.ny), self._lines(step, length)
-        on_w = [[0.0] * (nh := len(model.w_set.rows))] * length
-        on_w = array(step["on_w"], length, nh) if "on_w" in step else on_w
-        known, reach = self._set(first), None
-        costate = Vec([0] * n)
+        on_w = array(step["on_w"], length, len(model.w_set.rows)) if "on_w" in step else [()] * length
+        known, reach, costate = self._set(first), None, Vec([0] * n)
         total, summed = self._sums(step, first, last)
         for i in range(length - 1, -1, -1):
             k = first + i
-            _, rows, e = model.stack(k)
+            _, rows, e = model.stack(k, corner := vertex * (k + 1 == at))
             expect(all(abs(m) < LONGEST for m in costate.m), "a window's numbers are too long")
             noise, low, high, remainder = model.bounds(k)
-            for m, y, *widths in zip(on_output[i], self.log.y[k], noise, remainder, strict=True):
-                if m:  # of a reading that is missing, which is no number
-                    total -= num(m) * num(y) + num(abs(m)) * (num(widths[0]) + num(widths[1]))
+            for m, y, *widths in (r for r in zip(on_output[i], self.log.y[k], noise, remainder, strict=True) if r[0]):
+                total -= num(m) * num(y) + num(abs(m)) * (num(widths[0]) + num(widths[1]))  # y: no number if not read
             more = summed.get(k, Vec([0] * (model.rows + model.columns)))
             weight = Vec(costate.m + [0] * model.ny, costate.e) + Vec.of([0.0] * n + on_output[i]) + more[: model.rows]
-            sums = [0] * model.columns
-            for w, row in zip(weight.m, rows, strict=True):
-                if w:
-                    sums = [s + w * r for s, r in zip(sums, row, strict=True)]
+            used = [(w, row) for w, row in zip(weight.m, rows, strict=True) if w]
+            sums = [sum(w * row[j] for w, row in used) for j in range(model.columns)]
             g = Vec(sums, weight.e + e) + more[model.rows :] - (objective if at == k else Vec([0] * model.columns))
             owner, gain, functional, rest, _ = self.channels.get(k) or self._choose(k)
+            free = Vec([0] * n + weight.m[n:], weight.e) if corner else weight  # of the rows that Delta still moves
             for q in range(len(owner)):
-                on_p = Set([gain[q]] * 2).least(weight)
+                on_p = Set([gain[q]] * 2).least(free)
                 for side, m, slope, intercept in lines.pop((i, q), ()):
                     # max Delta s is convex in s, and min Delta s concave: a line bounds them if it does at both ends
-                    delta, ends = self._ends(k, q)
-                    gaps = [num(slope) * num(v) + num(intercept) - num(d) * num(v) for d in delta for v in ends]
+                    ends = product(*self._ends(k, q))
+                    gaps = [num(slope) * num(s) + num(intercept) - num(d) * num(s) for d, s in ends]
                     expect(all(side * gap.m[0] >= 0 for gap in gaps), f"a line of sample {k} does not bound its p")
                     on_p += num(side * m)
                     g -= num(side * m) * num(slope) * Vec.of(functional[q])
                     total -= num(side * m) * num(intercept)
                 if on_p.m[0]:
-                    products = [num(d) * num(s) for d in self._ends(k, q)[0] for s in self._ends(k, q)[1]]
-                    total += on_p * (min(products) if on_p.m[0] > 0 else max(products))
-            for row, column in (entry for entry in rest if weight.m[entry[0]]):
+                    total += min(on_p * num(d) * num(s) for d, s in product(*self._ends(k, q)))
+            for row, column in (entry for entry in rest if free.m[entry[0]]):
                 reach = reach or self._reach(known, first, last)
-                total -= Vec([abs(weight.m[row])], weight.e) * num(up(rest[row, column] * reach[i][column]))
+                total -= Vec([abs(free.m[row])], free.e) * num(up(rest[row, column] * reach[i][column]))
             total += Set([self.log.u[k]] * 2).least(g[n : n + nu]) + g[n + nu : n + nu + 1]
             total += model.w_set.within(Set([low, high])).least(g[n + nu + 1 :], on_w[i])
             costate = g[:n]
+            same = not vertex or k != at or not any((costate + objective[:n]).m)
+            expect(same, "multipliers after a transition at the vertices of Delta differ from vertex to vertex")
         expect(not lines, "a line is of a channel that there is not")
         return total + known.least(costate, array(step["on_start"], len(known.rows)))
 
     def _sums(self, step, first, last):  # what bounds of sums come to; by sample multipliers of rows, then of z
         total, found, model = num(0.0), {}, self.model
-        for (row, end), (m,) in stated(step, "on_sum", "sum", 1):
+        sums = array(step["sum"], None, 1) if "sum" in step else []
+        for (row, end), (m,) in zip(step.get("on_sum", []), sums, strict=True):
             column, length, *ends = model.sums[count(row)]
             expect(first + length - 1 <= count(end) <= last, "a sum is not within its window")
             total -= num(m) * num(ends[m > 0] if column >= model.ny else -ends[m < 0])  # a row of outputs is of -v
@@ -398,7 +400,8 @@ class Chain:  # what follows, step by step, about one observer's model
 
     def _lines(self, step, length):  # by index in the window and channel: side (1 above), multiplier, slope, intercept
         found = {}
-        for (i, q, side), (m, *line) in stated(step, "on_line", "line", 3):
+        lines = array(step["line"], None, 3) if "line" in step else []
+        for (i, q, side), (m, *line) in zip(step.get("on_line", []), lines, strict=True):
             expect(count(i) < length and count(side) < 2 and m >= 0.0, "a multiplier of a line is none")
             found.setdefault((i, count(q)), []).append((1 - 2 * side, m, *line))
         return found
@@ -411,13 +414,10 @@ class Chain:  # what follows, step by step, about one observer's model
     def _reach(self, known, first, last):  # bounds of |x|, |u|, 1, |w| at each sample, in floats rounded up
         found, x, deltas = [], largest(*known.box), largest(*zip(*self.model.delta, strict=True))
         for k in range(first, last + 1):
-            z = [*x, *map(abs, self.log.u[k]), 1.0, *largest(*self.model.bounds(k)[1:3])]
-            found.append(z)
-            x = []
-            for rows in zip(*(item[: self.model.n] for item in self.model.stack(k)[0]), strict=True):
-                items = zip([1.0, *deltas], rows, strict=True)
-                terms = [up(up(d * abs(a)) * b) for d, row in items for a, b in zip(row, z, strict=True) if a]
-                x.append(up(math.fsum(terms)))
+            found.append(z := [*x, *map(abs, self.log.u[k]), 1.0, *largest(*self.model.bounds(k)[1:3])])
+            items = [*zip([1.0, *deltas], self.model.stack(k)[0], strict=True)]
+            rows = [[(d, *ab) for d, item in items for ab in zip(item[i], z, strict=True)] for i in range(self.model.n)]
+            x = [up(math.fsum(up(up(d * abs(a)) * b) for d, a, b in row if a)) for row in rows]
         return found
 
 
@@ -484,8 +484,7 @@ def main():
         return 1
     for observer, sample, chain in found:
         print(f"PROVEN: {observer!r} is falsified at sample {sample} ({log.time[sample]:g} s); {chain.checked} steps")
-        for premise in chain.premises:
-            print(f"    given that {premise}")
+        print(*(f"    given that {premise}" for premise in chain.premises), sep="\n")
     for what, path in (("the models and bounds", given.model), ("the readings", given.log)):
         print(f"given {what} of {path} (sha256 {hashlib.sha256(Path(path).read_bytes()).hexdigest()})")
     print("where a decimal means the nearest double; that w and Delta are held from sample to sample, unless the")

@@ -388,10 +388,10 @@ class Equations(Model):  # a nonlinear model: what has been linearised of it sta
         self.premises += ["the equations hold where the state is in their range"] * (told["valid"] is not None)
         self.transitions, self.readings, self.nothing = {}, {}, [[0.0] * self.columns] * self.rows
 
-    def stack(self, k):
+    def stack(self, k, vertex=()):
         rows = self.transitions.get(k, self.nothing[: self.n]) + self.readings.get(k, (self.nothing[self.n :],))[0]
         self._stacks, self._known = [[rows]], {}
-        return super().stack(k)
+        return super().stack(k, vertex)
 
     def bounds(self, k):
         return [*super().bounds(k)[:3], self.readings[k][1] if k in self.readings else [0.0] * self.ny]
@@ -491,9 +491,9 @@ class Linearised(Chain):  # a chain whose samples are linearised over what it ha
             found.append([*x, *[0.0] * model.nu, one, *w])
         return found, R
 
-    def _total(self, step, *objective):
+    def _total(self, step, *objective, vertex=()):
         first, last, known = self._sample(step["first"]), self._sample(step["last"]), self.model
         expect(all(k in known.transitions for k in range(first, last)), "a sample of a window is not linearised")
         read = enumerate(array(step["on_output"], None, known.ny), first)
         expect(all(k in known.readings for k, row in read if any(row)), "an output of a window is not linearised")
-        return super()._total(step, *objective)
+        return super()._total(step, *objective, vertex=vertex)

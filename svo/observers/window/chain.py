@@ -19,6 +19,8 @@ from svo.logs.drive import drive
 from svo.logs.log import Log, expect_log
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
+from svo.observers.polytope.observer import PolytopeObserver
+from svo.observers.polytope.prover import HullProver
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.chain_starts import Start, own_start
 from svo.observers.window.evidence import ArrivalSet
@@ -26,6 +28,8 @@ from svo.observers.window.linearised_prover import LinearisedProver
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
 from svo.observers.window.prover import ChainProver, ProvenChain
+
+Prover = ChainProver | HullProver | LinearisedProver
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +74,7 @@ class LateMeasurement(Shown):
 
 def prover_of(
     observer: Observer, first: ArrivalSet, log: Log, since: int, begun: Start | None
-) -> ChainProver | LinearisedProver:
+) -> Prover:
     """What proves falsifications of an observer's model, by directions of its own if it has some.
 
     ``first`` was its set at its first sample, and it ran from ``begun`` on; ``since`` the model is claimed to hold.
@@ -78,7 +82,9 @@ def prover_of(
     if isinstance(observer.model, NonlinearModel):
         return LinearisedProver(observer.model, log, since, begun)
     template = observer.directions[observer.model.n_states :] if isinstance(observer, WindowObserver) else None
-    return ChainProver(ModelOnLog(observer.model, first, log), since, begun, template)
+    of = ModelOnLog(observer.model, first, log)
+    windows = ChainProver(of, since, begun, template)
+    return HullProver(windows, of, observer.max_facets) if isinstance(observer, PolytopeObserver) else windows
 
 
 def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasurement] = ()) -> ChainCheck:
@@ -130,7 +136,7 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
             at = k
             break
     found: ProvenChain | None = None
-    prover: ChainProver | LinearisedProver | None = None
+    prover: Prover | None = None
     if at is not None:
         own = own_start(again.model.start_range, first, again.largest_at)
         prover = prover_of(again, first, replace(log, y=y), 0, own)

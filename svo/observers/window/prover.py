@@ -88,14 +88,14 @@ class ChainProver:
     def prove(self, sample: int) -> ProvenChain | None:
         """The proof that no trajectory explains the readings up to a sample, or None; `reason` says why."""
         self.unproven = ()
-        for start in self._starts(sample):
+        for start in self.starts(sample):
             if self._falsified(self._window(start, sample, None), sample):
                 found = self._proven(start, sample)
                 if found is not None:
                     return found
         return None
 
-    def _starts(self, sample: int) -> Iterator[Start]:
+    def starts(self, sample: int) -> Iterator[Start]:
         """Starts before a sample, the nearest first."""
         before, physical, own = _NEAREST, self._of.model.physical_range, self._begun
         earliest = self._since if own is None else own.sample
@@ -140,9 +140,12 @@ class ChainProver:
         proof = window.proof
         assert isinstance(proof, WindowCertificate)  # hulls are kept
         steps.alarm(proof)
+        return ProvenChain(start, prover.checked, proof, steps.steps, self.given(start))
+
+    def given(self, start: Start) -> tuple[str, ...]:
+        """What a proof from a start on rests on."""
         promises = (start.premise, None if self._of.model.physical_range is None else "the physical range")
-        given = tuple(promise for promise in promises if promise is not None)
-        return ProvenChain(start, prover.checked, proof, steps.steps, given)
+        return tuple(promise for promise in promises if promise is not None)
 
 
 class BoundProver:

@@ -22,6 +22,8 @@ def array(values: Any) -> dict[str, Any]:
 class Trajectory:
     """A plant of short dyadic numbers, and a run of it: all of it is in floats without rounding."""
 
+    parts: tuple[float, ...] = 0.0, 1.0  # of the way from the lower end of Delta to the upper one
+
     def __init__(self, seed: int) -> None:
         self.rng = rng = np.random.default_rng(seed)
         self.least = -4 * int(rng.integers(2))  # where nothing is negative, bounds of sizes are reached too
@@ -39,7 +41,7 @@ class Trajectory:
         self.z = []
         for k in range(SAMPLES):
             self.z.append(np.concatenate((self.x[k], self.u[k], [1.0], self.w[k])))
-            held = [rng.choice(ends) for ends in self.delta]
+            held = [low + rng.choice(self.parts) * (high - low) for low, high in self.delta]
             stack = self.stacks[min(k, len(self.stacks) - 1)]
             after = (stack[0] + sum((d * s for d, s in zip(held, stack[1:], strict=True)), 0.0)) @ self.z[k]
             self.x.append(after[: self.n])
@@ -104,9 +106,9 @@ class Trajectory:
                 chain.channels[k][4].update({(k, q, -1): float(low), (k, q, 1): float(high)})
         return chain
 
-    def step(self, chain: Any) -> dict[str, Any]:
-        """Any multipliers on any window."""
-        first, last = sorted(int(k) for k in self.rng.integers(0, SAMPLES, 2))
+    def step(self, chain: Any, ends_at: tuple[int, int] | None = None) -> dict[str, Any]:
+        """Any multipliers on any window, or on that one."""
+        first, last = ends_at or sorted(int(k) for k in self.rng.integers(0, SAMPLES, 2))
         window = range(first, last + 1)
         ends = [(i, k) for i, (_, q, *_) in enumerate(chain.model.sums) for k in window if k - q + 1 >= first]
         lines, numbers = [], []
