@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from time import perf_counter
 
@@ -18,7 +20,7 @@ from svo.models import ModelSample, UncertainModel
 from svo.models.intervals import interval_of
 from svo.models.nonlinear import NonlinearModel
 from svo.observers.base import Observer
-from svo.observers.given_units import arrival_out
+from svo.observers.certificate import Certificate
 from svo.observers.window.certificate import OnWindow, WindowCertificate
 from svo.observers.window.chain import prover_of
 from svo.observers.window.chain_starts import Start, own_start
@@ -246,13 +248,22 @@ def _beginning(bank: Bank, alarm: Alarm, log: Log, first: ArrivalSet) -> tuple[i
     rests_on_first = observer.model.start_range is None or (proof is not None and proof.largest_at is None)
     if not bank.may_start_again and rests_on_first:
         return 0, Start("first", 0, first)
-    step = next(verdict for verdict in drive(bank, log) if verdict.sample == alarm.sample).steps.get(alarm.observer)
+    answers = drive(bank, log)
+    deque(islice(answers, alarm.sample), maxlen=0)
+    given = observer.first_set  # before the bank starts it again on account of the alarm
+    step = next(answers).steps.get(alarm.observer)
     if step is None:
         return None
     since = alarm.sample - step.sample
-    begun = own_start(observer.model.start_range, first, observer.largest_at, since)
-    if begun is not None or not (isinstance(observer, WindowObserver) and observer.current_window.is_given):
+    begun = own_start(observer.model.start_range, first, _largest_at(step.certificate), since)
+    given = given if step.sample else observer.first_set
+    if begun is not None or given is None:
         return since, begun
-    own = arrival_out(observer.current_window.anchor, observer.current_window.settings.form)
     left_by = "the global set" if isinstance(bank, ArchitectureII) else "the set that the survivors left"
-    return since, Start("assumed", since, own, because=left_by)
+    return since, Start("assumed", since, given, because=left_by)
+
+
+def _largest_at(proof: Certificate | None) -> int | None:
+    """Sample, as its observer counts, at which the set that a proof rests on started again from the largest one."""
+    found = getattr(proof.about() if isinstance(proof, OnWindow) else proof, "largest_at", None)
+    return None if found is None else int(found)

@@ -68,7 +68,7 @@ class Observer(Shown, Capabilities, ABC):
     largest_at : int or None
         Sample at which the set last started from the model's largest set, if what is known now rests on it.
     first_set : ArrivalSet or None
-        Of the state at its first sample, as it was given; a proof of its whole chain needs it.
+        Of the state at its first sample, as it was given; a proof of its whole chain needs it. None where none was.
     """
 
     model: UncertainModel
@@ -153,6 +153,7 @@ class Observer(Shown, Capabilities, ABC):
         """
         self._check_can(self.starts_without_set, "has no lose_set: it cannot start without a set")
         self._forget()
+        self.first_set = None
         self._lose_set()
 
     def update(

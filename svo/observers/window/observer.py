@@ -164,11 +164,6 @@ class WindowObserver(Observer):
         return values if physical is None else np.minimum(values, physical.support(directions))
 
     @property
-    def current_window(self) -> Window:
-        """The window as it stands."""
-        return self._window
-
-    @property
     def _window(self) -> Window:
         return self._known.window
 

@@ -108,11 +108,6 @@ class Window:
         return self.origin + self.memory.time if self.memory.started else -1
 
     @property
-    def is_given(self) -> bool:
-        """Whether it is falsified, over samples that begin with the set that its observer was given."""
-        return self.proof is not None and self.origin == 0 and not self.free
-
-    @property
     def stopped(self) -> int:
         """Programs that ended at a limit."""
         return self._programs.stopped

@@ -183,10 +183,10 @@ def test_more_room_for_bases_in_the_middle_of_a_log() -> None:
     case = tank()
     log = healthy(case, np.random.default_rng(SEED), 60)
     walked, ran = (WindowObserver(case.model, first(case), horizon=25) for _ in range(2))
-    rooms = {observer.current_window.memory.size.K for observer in (walked, ran)}
+    rooms = {observer._window.memory.size.K for observer in (walked, ran)}
     assert at_once(ran, log, False)[0] == by_steps(walked, log, False)
     assert ran.state_dict()["inverse"].tobytes() == walked.state_dict()["inverse"].tobytes()
-    assert {ran.current_window.memory.size.K} != rooms
+    assert {ran._window.memory.size.K} != rooms
 
 
 def test_a_portion_of_a_log_goes_on_where_the_one_before_ended() -> None:
