@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from test_checker_on_trajectories import CHECK, SAMPLES, Trajectory, array, exact
 
+from svo import UncertainModel
 from svo.models.state_range import StateRange
-from svo.observers.window.chain_starts import from_readings, own_start
+from svo.observers.window.chain_starts import Start, from_readings, own_start
 from svo.observers.window.evidence import ArrivalSet
 from svo.observers.window.log_model import ModelOnLog
+from svo.observers.window.prover import ChainProver
 from tests.svo.observers.random_plants import random_plant
 
 
@@ -106,3 +108,19 @@ def test_an_observer_began_with_a_set_that_the_model_states_or_with_one_that_was
     if start is not None:
         assert start.sample == (since + 2 if kind == "largest" else 0)
         assert start.set.box_upper == (9.0 if kind == "largest" else 1.0)
+
+
+@pytest.mark.parametrize("begun", [None, 0, 297])
+@pytest.mark.parametrize("since", [0, 290])
+def test_no_chain_begins_before_its_model_is_claimed_to_hold(since: int, begun: int | None) -> None:
+    """The nearest first, each twice as far; at last where its observer began, or the readings of there."""
+    rng = np.random.default_rng(0)
+    model = UncertainModel([[0.9]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.1], Ts=1.0)
+    first = ArrivalSet.box(np.zeros(1), np.ones(1))
+    of = ModelOnLog(model, first, model.simulate([0.5], np.zeros((301, 0)), rng))
+    own = None if begun is None else Start("assumed", begun, first)
+    found = [(start.kind, start.sample) for start in ChainProver(of, since, own)._starts(300)]
+    earliest = since if begun is None else begun
+    last = ("readings", since) if begun is None else ("assumed", begun)
+    nearer = [("readings", 300 - before) for before in (4, 8, 16, 32, 64, 128, 256) if 300 - before > earliest]
+    assert found == [*nearer, last]

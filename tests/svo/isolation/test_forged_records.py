@@ -215,6 +215,16 @@ def test_bounds_of_s_that_are_taken_as_given_are_named(tmp_path: Path, is_known:
     assert given in verify(path).summary
 
 
+@pytest.mark.parametrize(("of", "takes"), [("A", True), ("E", True), ("a", False)])
+def test_bounds_of_s_are_taken_as_given_where_they_are_of_states_or_disturbances(of: str, takes: bool) -> None:
+    delta = Uncertainty(**{of: [0.5] if of == "a" else [[0.5]]})
+    model = UncertainModel([[1.0]], None, [[1.0]], E=[[1.0]], w=[0.1], n=[0.2], Ts=1.0, uncertainties=[delta])
+    log = Log(np.arange(2.0), np.zeros((2, 0)), np.array([[0.9], [9.0]]))
+    proof = WindowObserver(model, HPolytope.box([-1.0], [1.0])).run(log).certificate
+    assert proof is not None
+    assert ("the bounds of s" in proof.premise(1)) is takes
+
+
 def test_the_record_of_one_model_is_no_alarm_of_another(tmp_path: Path, cart: tuple[Any, Any, list[str]]) -> None:
     plant, log, lines = cart
     path, names = tmp_path / "alarms.jsonl", ("nominal", "motor", "sensor")
