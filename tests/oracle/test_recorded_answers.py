@@ -23,9 +23,10 @@ def recorded() -> dict[tuple[str, int], Answers]:
 ANSWERS = recorded()
 
 
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", ["program", "chain", "polytope"])
-def test_every_answer_is_the_same_or_narrower(kind: str) -> None:
-    keys = [key for key in ANSWERS if key[0] == kind]
-    assert len(keys) >= 100
+def test_every_answer_is_the_same_or_narrower(kind: str, every: int) -> None:
+    keys = [key for key in ANSWERS if key[0] == kind][::every]
+    assert len(keys) >= 100 // every
     found = {key: difference(kind, ANSWERS[key], KINDS[kind](key[1])) for key in keys}
     assert {key: d for key, d in found.items() if d.what is not None} == {}

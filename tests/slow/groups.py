@@ -22,7 +22,7 @@ class Step:
 
 
 FOLDERS = {
-    "core": ("tests/core",),
+    "core": ("tests/core", "tests/oracle"),
     "polytopes": ("tests/polytopes",),
     "observers": ("tests/svo/observers", "tests/svo/isolation"),
     "plants": ("tests/aircraft", "tests/benchmarks"),

@@ -130,8 +130,13 @@ def test_the_stated_faults_are_told_apart(tmp_path: Path) -> None:
     for fault, case in found["faults"].items():
         assert case["observers"][fault]["horizon"] is None
     assert found["faults"]["leak"]["observers"]["nominal"]["horizon"] is not None
-    designed = json.loads(svo("design-input", toml, "--fault", "gauge", "--horizon", "2", "--json"))
+    written = tmp_path / "u.csv"
+    designed = json.loads(svo("design-input", toml, "--fault", "gauge", "--horizon", "2", "--out", written, "--json"))
     assert designed["horizon"] == 1
+    table = np.genfromtxt(written, delimiter=",", names=True)
+    assert table.dtype.names == ("time_s", *designed["inputs"])
+    for name, values in designed["inputs"].items():
+        np.testing.assert_array_equal(table[name], values)
 
 
 def test_a_study_runs_and_its_alarms_are_proven(tmp_path: Path) -> None:
