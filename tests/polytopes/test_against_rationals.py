@@ -14,7 +14,7 @@ from integer_systems import KINDS, many, system
 from polytopes import HPolytope, convex_hull
 from polytopes.projection import METHODS
 
-AMOUNT = pytest.mark.parametrize("count", [150, pytest.param(1400, marks=pytest.mark.slow)])
+AMOUNT = pytest.mark.parametrize("count", [60, pytest.param(1400, marks=pytest.mark.slow)])
 EVERY = pytest.mark.parametrize("kind", KINDS)
 
 
