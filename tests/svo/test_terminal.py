@@ -14,20 +14,15 @@ from typing import Any
 import pytest
 from rich.table import Table
 from rich.text import Text
-from typer.testing import CliRunner
 
-from svo.cli import app
 from svo.plant.registry import made_by
 from svo.terminal import console, line, plain, safe_output
+from tests.svo.commands import svo
 
 CART = Path(__file__).parents[2] / "docs" / "examples" / "cart.toml"
 LOG = CART.with_suffix(".csv")
 ESCAPES = ["\x1b[31m", "\x1b]0;owned\x07", "\x9b2J", "\x08\x08", "\x7f", "\x00", "‮", "\u2028", "!"]
 HOSTILE = "".join(ESCAPES).replace("\x00", "")  # a watch takes no line with NUL bytes for text
-
-
-def svo(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def assert_harmless(text: str) -> None:

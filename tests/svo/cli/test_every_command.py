@@ -15,20 +15,16 @@ from typing import Any
 
 import pytest
 import typer.main
-from typer.testing import CliRunner
 
 from svo.cli import app
 from svo.cli import progress as progress_module
 from svo.cli.output import print_json
+from tests.svo.commands import svo
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 CART, LOG = EXAMPLES / "cart.toml", EXAMPLES / "cart.csv"
 COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 PRINTS_NO_FIGURES = {"report"}
-
-
-def svo(*arguments: str | Path, **options: Any) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], **options)
 
 
 @pytest.mark.parametrize("width", ["80", "60", "200"])

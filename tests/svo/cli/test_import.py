@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
 
 from svo import Log, detect, find_plant, read_log, verify
-from svo.cli import app
 from svo.logs.columns import LogNote
 from svo.plant.description import DescribedPlant
 from svo.plant.imported import told_of
+from tests.svo.commands import svo
 from tests.svo.logs.dialect.carts import EXAMPLE, cart
 from tests.svo.logs.dialect.test_twelve_dialects import NUMBERS, TABLES, logs
 
@@ -30,10 +29,6 @@ force = { column = "Kraft" }
 position = { column = "Weg [mm]", unit = "mm", resolution = 0.2 }
 """
 CLEAN = Path(__file__).parents[3] / "docs" / "examples" / "cart.csv"
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture
@@ -57,7 +52,7 @@ def quietly(path: Path, plant: object) -> Log:
 
 def test_an_imported_log_is_what_was_read(recording: Path) -> None:
     toml, out = recording.with_name("my_cart.toml"), recording.with_name("log.parquet")
-    done = run("import", recording, "--toml", toml, "--out", out)
+    done = svo("import", recording, "--toml", toml, "--out", out)
     assert done.exit_code == 0, done.output
     assert "80 samples of 0.1 s, 0 to 7.9 s, the first one at 0 s" in done.stdout
     assert "force: -0.999 to 0.999 N, 0 missing" in done.stdout
@@ -71,7 +66,7 @@ def test_an_imported_log_is_what_was_read(recording: Path) -> None:
 
 def test_an_imported_log_says_where_it_comes_from(recording: Path) -> None:
     toml, out = recording.with_name("my_cart.toml"), recording.with_name("log.parquet")
-    done = run("import", recording, "--toml", toml, "--out", out, "--json")
+    done = svo("import", recording, "--toml", toml, "--out", out, "--json")
     said = json.loads(done.stdout)
     digest = hashlib.sha256(recording.read_bytes()).hexdigest()
     told = told_of(out)
@@ -89,13 +84,13 @@ def test_an_imported_log_says_where_it_comes_from(recording: Path) -> None:
 
 def test_alarms_of_an_imported_log_are_those_of_its_source_and_are_proven(recording: Path) -> None:
     toml, out = recording.with_name("my_cart.toml"), recording.with_name("log.parquet")
-    run("import", recording, "--toml", toml, "--out", out)
+    svo("import", recording, "--toml", toml, "--out", out)
     for log in (recording, out):
         folder = recording.with_name(f"found_{log.suffix[1:]}")
-        done = run("detect", toml, log, "--out", folder)
+        done = svo("detect", toml, log, "--out", folder)
         assert "Fault isolated at 5.0 s: sensor." in done.stdout, done.output
         for option in ("--log", "--full") if log is out else ("--log",):
-            done = run("verify", folder / "alarms.jsonl", option, log)
+            done = svo("verify", folder / "alarms.jsonl", option, log)
             assert "2 of 2 alarms proven" in done.stdout, done.output
     assert "was imported from recording.txt" in done.stderr
 
@@ -118,7 +113,7 @@ def test_the_widening_is_in_the_models_of_the_alarms(recording: Path) -> None:
 
 
 def test_calibration_takes_the_widening(recording: Path) -> None:
-    done = run("calibrate", recording.with_name("my_cart.toml"), recording)
+    done = svo("calibrate", recording.with_name("my_cart.toml"), recording)
     assert done.exit_code == 0, done.output
 
 
@@ -138,7 +133,7 @@ def test_wrong_use_is_one_line(
 ) -> None:
     monkeypatch.chdir(recording.parent)
     places = {"log": str(recording), "toml": str(recording.with_name("my_cart.toml"))}
-    done = run("import", *(argument.format(**places) for argument in arguments))
+    done = svo("import", *(argument.format(**places) for argument in arguments))
     assert done.exit_code == 1
     assert words in done.stderr
     assert done.stderr.count("\n") == 1
@@ -146,10 +141,10 @@ def test_wrong_use_is_one_line(
 
 def test_a_plain_log_is_imported_too_and_never_over_itself(tmp_path: Path) -> None:
     out = tmp_path / "log.parquet"
-    assert run("import", CLEAN, "--toml", EXAMPLE, "--out", out).exit_code == 0
+    assert svo("import", CLEAN, "--toml", EXAMPLE, "--out", out).exit_code == 0
     plant = find_plant(EXAMPLE)
     np.testing.assert_array_equal(quietly(out, plant).y, read_log(CLEAN, plant).y)
-    done = run("import", out, "--toml", EXAMPLE, "--out", out)
+    done = svo("import", out, "--toml", EXAMPLE, "--out", out)
     assert done.exit_code == 1
     assert "is the log itself" in done.stderr
 
@@ -158,7 +153,7 @@ def test_a_plain_log_is_imported_too_and_never_over_itself(tmp_path: Path) -> No
 
 
 def guess(path: Path, toml: Path = EXAMPLE) -> str:
-    done = run("import", path, "--guess", "--toml", toml)
+    done = svo("import", path, "--guess", "--toml", toml)
     assert done.exit_code == 0, done.output
     return done.stdout
 
@@ -236,7 +231,7 @@ def test_what_a_guess_finds(text: str, lines: list[str], tmp_path: Path) -> None
 @pytest.mark.parametrize("content", [b"", b"\n\n", b"hello\nworld\n", bytes(range(256)) * 8, b"a,b\n", b"\xff\xfe"])
 def test_a_guess_of_what_is_no_log_is_one_line(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "log.txt").write_bytes(content)
-    done = run("import", tmp_path / "log.txt", "--guess")
+    done = svo("import", tmp_path / "log.txt", "--guess")
     assert done.exit_code == 1
     assert "log.txt" in done.stderr
     assert done.stderr.count("\n") == 1

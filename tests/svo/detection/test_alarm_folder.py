@@ -5,32 +5,20 @@ from __future__ import annotations
 import json
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from svo.cli import app
 from svo.detection.alarm_folder import watch_folder
 from svo.detection.detect import detect
 from svo.isolation.alarms import Alarm, alarm_line, verify_alarms
 from svo.logs.file import read_log
 from svo.plant.description import keep_description, read_description
+from tests.svo.commands import one_line, svo
 
 CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
 LOG = CART.with_suffix(".csv")
 PLANT = read_description(CART)
 ABOUT = {"plant": "cart.toml", "noise": "stated", "log": "/log.csv"}
-
-
-def svo(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
-def refusal(result: Any) -> str:
-    assert result.exit_code == 1, result.output
-    (error,) = [line for line in result.stderr.splitlines() if line.startswith("error:")]
-    return str(error)
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -60,7 +48,7 @@ def test_a_folder_with_results_of_any_command_is_refused_and_stays(tmp_path: Pat
     before = content(tmp_path)
     commands: list[tuple[str | Path, ...]] = [("detect", CART, LOG), ("watch", CART, LOG, "--until-end")]
     for command in commands:
-        message = refusal(svo(*command, "--out", out))
+        message = one_line(svo(*command, "--out", out))
         assert name in message
         assert "give another folder" in message or "symbolic link" in message
     with pytest.raises(ValueError, match="never overwritten"):
@@ -73,7 +61,7 @@ def test_detection_again_into_the_same_folder_is_refused(tmp_path: Path) -> None
     assert svo("detect", CART, LOG, "--out", tmp_path / "out").exit_code == 0
     before = content(tmp_path)
     for command in ("detect", "watch"):
-        message = refusal(svo(command, CART, LOG, "--out", tmp_path / "out"))
+        message = one_line(svo(command, CART, LOG, "--out", tmp_path / "out"))
         assert "out holds results already (alarms.jsonl, verdict.json), and these are never overwritten" in message
     assert content(tmp_path) == before
 
@@ -91,7 +79,7 @@ def test_detection_into_the_folder_of_a_study_is_refused(registered_tank: str, t
     svo("simulate", "tank", "--out", tmp_path / "log.csv")
     before = content(out)
     for command in (("detect", "tank"), ("watch", "tank", "--until-end")):
-        message = refusal(svo(command[0], "tank", tmp_path / "log.csv", *command[2:], "--out", out))
+        message = one_line(svo(command[0], "tank", tmp_path / "log.csv", *command[2:], "--out", out))
         assert "study.json" in message
     assert content(out) == before
     assert svo(*study, "--resume").exit_code == 0
@@ -121,15 +109,15 @@ def test_a_watch_of_something_else_does_not_join(tmp_path: Path) -> None:
     other.write_bytes(LOG.read_bytes())
     assert svo("watch", CART, LOG, "--until-end", "--out", out).exit_code == 0
     before = content(out)
-    message = refusal(svo("watch", CART, other, "--until-end", "--out", out))
+    message = one_line(svo("watch", CART, other, "--until-end", "--out", out))
     assert "out holds the alarms of another watch (log was " in message
     changed = tmp_path / "cart.toml"
     changed.write_text(CART.read_text().replace("n = [0.05]", "n = [0.06]"))
-    message = refusal(svo("watch", changed, LOG, "--until-end", "--out", out))
+    message = one_line(svo("watch", changed, LOG, "--until-end", "--out", out))
     assert "cart.toml is another file than" in message
     for text in ("", "{", "[]", '{"format": "svo-watch-9"}', "\x00"):
         (out / "watch.json").write_text(text)
-        assert "watch.json is not that of a watch" in refusal(svo("watch", CART, LOG, "--until-end", "--out", out))
+        assert "watch.json is not that of a watch" in one_line(svo("watch", CART, LOG, "--until-end", "--out", out))
     (out / "watch.json").write_bytes(before["watch.json"])
     assert content(out) == before
 
@@ -181,7 +169,7 @@ def test_another_description_is_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "cart.toml").write_text("mine\n")
     with pytest.raises(ValueError, match=r"cart\.toml is another file than .*; give another folder"):
         keep_description(PLANT, tmp_path)
-    assert "is another file than" in refusal(svo("detect", CART, LOG, "--out", tmp_path))
+    assert "is another file than" in one_line(svo("detect", CART, LOG, "--out", tmp_path))
     assert content(tmp_path) == {"cart.toml": b"mine\n"}
     (tmp_path / "cart.toml").unlink()
     (tmp_path / "cart.toml").symlink_to(tmp_path / "elsewhere")

@@ -11,10 +11,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from svo import detect, find_plant, read_log
-from svo.cli import app
 from svo.detection.found import Detection
 from svo.detection.report.facts import bank_of, bounds_table, log_facts
 from svo.detection.report.options import ReportOptions
@@ -22,20 +20,11 @@ from svo.detection.report.pictures import pictures_of
 from svo.detection.report.report import write_report
 from svo.logs.log import Log
 from svo.plant import load_plant
+from tests.svo.commands import one_line, svo
 
 CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
 LOG = CART.with_suffix(".csv")
 EVIL = "</script><img src=x onerror=alert(1)> {{ 7 * 7 }}"
-
-
-def svo(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
-def refused(result: Any) -> str:
-    assert result.exit_code == 1, result.output
-    (message,) = [text for text in result.stderr.splitlines() if text.startswith("error: ")]
-    return str(message)
 
 
 def text_of(page: str) -> str:
@@ -137,12 +126,12 @@ def test_what_cannot_be_shown_is_said_before_anything_is_computed(
 ) -> None:
     monkeypatch.setattr("svo.isolation.Bank.run", lambda *_, **__: pytest.fail("work was begun"))
     report = ("detect", CART, LOG, "--out", tmp_path / "out", "--report")
-    message = refused(svo(*report, "--states", "true_speed,tilt"))
+    message = one_line(svo(*report, "--states", "true_speed,tilt"))
     assert "'tilt'" in message
     assert "true_position, true_speed, position" in message
-    assert "expected any of svg, pdf, png" in refused(svo(*report, "--format", "svg,gif"))
-    assert "expected --out DIR" in refused(svo("detect", CART, LOG, "--report"))
-    assert "without --report" in refused(svo("detect", CART, LOG, "--out", tmp_path / "out", "--states", "true_speed"))
+    assert "expected any of svg, pdf, png" in one_line(svo(*report, "--format", "svg,gif"))
+    assert "expected --out DIR" in one_line(svo("detect", CART, LOG, "--report"))
+    assert "without --report" in one_line(svo("detect", CART, LOG, "--out", tmp_path / "out", "--states", "true_speed"))
     assert not (tmp_path / "out").exists()
 
 

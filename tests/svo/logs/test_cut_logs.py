@@ -5,25 +5,19 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from svo.cli import app
 from svo.logs.columns import LogNote
 from svo.logs.file import read_log
 from svo.logs.log import Log
 from svo.plant.description import read_description
+from tests.svo.commands import svo
 
 CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
 TEXT = CART.with_suffix(".csv").read_text()
 PLANT = read_description(CART)
-
-
-def svo(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def log_of(path: Path, data: bytes) -> tuple[Log, list[str]]:

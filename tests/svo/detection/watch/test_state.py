@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from svo.cli import app
 from svo.detection.watch.follow import FileLines
 from svo.detection.watch.session import Session, identity_of
 from svo.detection.watch.state import resume_state, save_state
@@ -19,13 +17,10 @@ from svo.isolation.alarms import alarm_line
 from svo.logs.file import write_log
 from svo.plant import BankChoice, load_plant, resume_schedule, saved_schedule, schedule_of, with_bank
 from svo.plant.description import read_description
+from tests.svo.commands import svo
 
 CART = Path(__file__).parents[4] / "docs" / "examples" / "cart.toml"
 TEXT = CART.with_suffix(".csv").read_text()
-
-
-def svo(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def stream_of(session: Session, lines: list[str]) -> list[tuple[list[str], Any]]:

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from svo.cli import app
 from svo.plant import load_plant
 from svo.store import locked
 from svo.store.packed_lines import members_of
@@ -22,6 +20,7 @@ from svo.studies.isolation.run import RunRow
 from svo.studies.isolation.runner import run_study
 from svo.studies.isolation.store import StudyFolder
 from svo.studies.isolation.summary import summarise
+from tests.svo.commands import svo
 
 STUDY = ["study", "tank", "--runs", "1", "--seed", "3", "--workers", "1"]
 
@@ -32,10 +31,6 @@ def configuration() -> StudyConfiguration:
 
 def untimed(folder: StudyFolder) -> list[RunRow]:
     return [replace(row, microseconds_per_step=0.0, microseconds_p99=0.0) for row in folder.rows()]
-
-
-def run(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")
@@ -80,12 +75,12 @@ def test_a_damaged_part_is_computed_again(study: StudyFolder, damage: Callable[[
 def test_a_damaged_part_is_named_and_left_out_on_request(study: StudyFolder) -> None:
     rows = untimed(study)
     flip(study.parts / "run-000002.parquet")
-    answer = run("report", study.path)
+    answer = svo("report", study.path)
     assert answer.exit_code == 1
     assert "run-000002.parquet: its checksum does not match" in answer.output
     assert "--resume" in answer.output
     assert "--without-damaged" in answer.output
-    answer = run("report", study.path, "--without-damaged")
+    answer = svo("report", study.path, "--without-damaged")
     assert answer.exit_code == 0, answer.output
     assert "run-000002.parquet: its checksum does not match" in answer.output
     assert "3 runs" in (study.path / "report.html").read_text(encoding="utf-8")
@@ -113,7 +108,7 @@ def test_copies_and_strays_neither_count_nor_break_anything(study: StudyFolder) 
     (study.path / "exemplars" / "run-000007.npz").write_bytes(b"")
     (study.path / ".DS_Store").write_bytes(b"")
     assert untimed(study) == rows
-    answer = run("report", study.path)
+    answer = svo("report", study.path)
     assert answer.exit_code == 0, answer.output
     assert "run-000099.parquet is none of the study's runs; ignored" in answer.output
     assert ".DS_Store" not in answer.output
@@ -126,7 +121,7 @@ def test_alarms_of_another_command_are_never_taken_for_the_studys_own(study: Stu
     study.alarms.write_bytes(foreign)
     with pytest.raises(ValueError, match=r"alarms\.jsonl\.gz is not what this study wrote: .*--resume"):
         resumed(study)
-    answer = run(*STUDY, "--resume", "--out", study.path)
+    answer = svo(*STUDY, "--resume", "--out", study.path)
     assert answer.exit_code == 1
     assert "is not what this study wrote" in answer.output
     assert study.alarms.read_bytes() == foreign
@@ -171,10 +166,10 @@ def test_two_processes_do_not_work_in_one_folder(study: StudyFolder) -> None:
     with locked(study.path):
         with pytest.raises(ValueError, match="is in use by process"):
             resumed(study)
-        answer = run(*STUDY, "--resume", "--out", study.path)
+        answer = svo(*STUDY, "--resume", "--out", study.path)
         assert answer.exit_code == 1
         assert "is in use by process" in answer.output
-        assert run("report", study.path).exit_code == 0  # a study that is running can be looked at
+        assert svo("report", study.path).exit_code == 0  # a study that is running can be looked at
 
 
 def test_reports_are_not_written_through_links(study: StudyFolder, tmp_path: Path) -> None:
@@ -183,7 +178,7 @@ def test_reports_are_not_written_through_links(study: StudyFolder, tmp_path: Pat
         (tmp_path / name).write_text("mine")
         (study.path / name).unlink(missing_ok=True)
         (study.path / name).symlink_to(tmp_path / name)
-    assert run("report", study.path).exit_code == 0
+    assert svo("report", study.path).exit_code == 0
     assert [(tmp_path / name).read_bytes() for name in names] == [b"mine"] * 3
 
 
@@ -241,10 +236,10 @@ def test_a_study_that_says_nonsense_about_itself_is_one_clear_error(
 ) -> None:
     identity = study.path / "study.json"
     identity.write_text(edit(identity.read_text(encoding="utf-8")), encoding="utf-8")
-    answer = run("report", study.path)
+    answer = svo("report", study.path)
     assert answer.exit_code == 1
     assert expected in " ".join(answer.output.split())
     assert answer.output.count("\n") == 1
-    answer = run(*STUDY, "--resume", "--out", study.path)
+    answer = svo(*STUDY, "--resume", "--out", study.path)
     assert answer.exit_code == 1
     assert answer.output.splitlines()[-1].startswith("error: ")
