@@ -105,6 +105,11 @@ def calibrate(
         middle of the trajectory that the last one found. The pieces make one trajectory, so what is found does
         explain the log, but a smaller widening may exist.
 
+    Returns
+    -------
+    Calibration
+        The widenings, and the model with them.
+
     Notes
     -----
     The cost of a widening is its size relative to the half-width of the bound, or where that is zero to the unit of the

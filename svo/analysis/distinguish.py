@@ -90,6 +90,11 @@ def distinguishability(
     schedule : (K, ...) array, optional
         Scheduling value of each sample; needed if an array of a model is a function of it.
 
+    Returns
+    -------
+    Distinguishability
+        The number of samples, whether it is exact, and a common output of both models over one sample less.
+
     Raises
     ------
     ValueError, TypeError

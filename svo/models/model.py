@@ -131,18 +131,22 @@ class UncertainModel(Shown):
 
     @property
     def n_states(self) -> int:
+        """How many states x there are."""
         return self.layout.n
 
     @property
     def n_inputs(self) -> int:
+        """How many inputs u there are."""
         return self.layout.nu
 
     @property
     def n_outputs(self) -> int:
+        """How many sensors y there are."""
         return self.layout.ny
 
     @property
     def n_disturbances(self) -> int:
+        """How many disturbances w there are."""
         return self.layout.nw
 
     @property

@@ -39,7 +39,8 @@ class NonlinearModel(Value, Shown):
     """A plant dx/dt = f(x, u, w, p), y = h(x, u, w, p) + v, |v| <= n, taken by `WindowObserver`.
 
     f and h are traced once. At each sample the observer linearises the plant over the set that it knows, with a bound
-    of what that leaves out which holds for every state of the set, every w and every p: see `docs/nonlinear.md`.
+    of what that leaves out which holds for every state of the set, every w and every p (linear forms with remainders,
+    rounded outward; steps in time are enclosed before they are taken). How, and how wide, is in `docs/nonlinear.md`.
 
     Parameters
     ----------
@@ -192,18 +193,22 @@ class NonlinearModel(Value, Shown):
 
     @property
     def n_states(self) -> int:
+        """How many states there are: those of f, then the ``kept`` parameters."""
         return len(self.states) + len(self.kept)
 
     @property
     def n_inputs(self) -> int:
+        """How many inputs u there are."""
         return len(self.inputs)
 
     @property
     def n_outputs(self) -> int:
+        """How many sensors y there are."""
         return len(self.noise)
 
     @property
     def n_disturbances(self) -> int:
+        """How many disturbances w there are."""
         return len(self.disturbances)
 
     @property

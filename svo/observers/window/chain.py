@@ -34,7 +34,7 @@ Prover = ChainProver | HullProver | LinearisedProver
 
 @dataclass(frozen=True, eq=False)
 class ChainCheck(Shown):
-    """What `prove_chain` found when it ran a log again.
+    """What `prove_chain` found.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class ChainCheck(Shown):
     certificate : WindowCertificate or None
         Of the proof's last window; None without a proof.
     seconds : float
-        Time that it took.
+        Wall time that it took [s].
     given : tuple of str
         What the proof rests on besides the model, its bounds and the log: where it starts, and the physical range.
     """
@@ -65,7 +65,17 @@ class ChainCheck(Shown):
 
 @dataclass(frozen=True, eq=False)
 class LateMeasurement(Shown):
-    """Outputs y (ny,) of sample ``taken`` that the observer got right after sample ``arrived``; NaN = not these."""
+    """A measurement that the observer got after its sample.
+
+    Attributes
+    ----------
+    arrived : int
+        Number of the sample right after which it came.
+    taken : int
+        Number of the sample that it is of, at most ``arrived``.
+    y : (ny,) array
+        In the outputs' own units; NaN = not these.
+    """
 
     arrived: int
     taken: int
@@ -88,7 +98,10 @@ def prover_of(
 
 
 def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasurement] = ()) -> ChainCheck:
-    """Run a log again through an observer like the given one, and prove its falsification from its start on.
+    """Run a log through an observer like the given one; prove its falsification from the model and the log alone.
+
+    The proof is none of the observer's own: it begins where the readings nearest to the falsification bound the state,
+    else with the physical range or the first set, and every bound that it takes is proven in rationals.
 
     Parameters
     ----------

@@ -134,6 +134,7 @@ class WindowObserver(Observer):
 
     @property
     def largest_at(self) -> int | None:
+        """Sample at which the set last started from the model's largest set, if what is known now rests on it."""
         return self._known.largest_at
 
     @largest_at.setter
