@@ -97,6 +97,7 @@ class _Run:
         self._form, self._carrier = form, form.model
         self._window = Window(settings, arrival_in(start.set, form), origin=start.sample, prover=self)
         self._known = self._within(Span(start.set.box_lower, start.set.box_upper))
+        model.flow.check_valid(self._known)  # what is read of other states nothing is known of
         self._bounds = 0
         self._steps = [start_step(start, np.zeros((0, model.n_states)))]
 

@@ -20,6 +20,7 @@ from polytopes import HPolytope
 from svo import ArchitectureI, NonlinearModel, WindowObserver, find_plant, prove_chain
 from svo.cli import app
 from svo.detection.plant_record import observer_record
+from svo.functions import sroot
 from svo.logs.log import Log
 from svo.observers import window_kernel
 from svo.observers.window.chain_starts import own_start
@@ -93,6 +94,20 @@ def test_a_map_with_a_constant_parameter_is_proven(tmp_path: Path) -> None:
     files = proven(Nonlinear(case), log, tmp_path)
     assert files is not None
     ((_, _, premises),) = claims(files)
+    assert "the equations hold where the state is in their range" in premises
+
+
+def test_no_chain_begins_where_the_equations_may_not_hold(tmp_path: Path) -> None:
+    """The checker takes nothing that is read of such states: of a physical range that is wider than the valid one."""
+    model = NonlinearModel(
+        lambda x, u: [u[0] - 0.2 * sroot(x[0])], lambda x: [x[0]], states=["h"], inputs=["Q"], n=[0.05], Ts=0.5,
+        physical=([0], [20]), valid=([0], [9]),
+    )  # fmt: skip
+    case = Case(model, np.array([4.0]), np.array([0.1]), lambda k: [0.4])
+    files = proven(Nonlinear(case), run_of(case, 12), tmp_path)
+    assert files is not None
+    ((_, sample, premises),) = claims(files)
+    assert sample == 12
     assert "the equations hold where the state is in their range" in premises
 
 
