@@ -35,14 +35,14 @@ static void grow(const plant *p, integer trial)
     cut_by_physical(p, box);
 }
 
-/* Strictly, but for faces of the physical range. */
-static int image_is_inside(const plant *p)
+/* The first coordinate in which the image is not strictly inside, but for faces of the physical range; n if there is none. */
+static integer first_outside(const plant *p)
 {
-    int inside = 1;
-    for (integer i = 0; i < p->n; i++)
-        inside &= (p->image.low[i] > p->z.low[i] || p->z.low[i] <= p->physical_low[i])
-                  && (p->image.high[i] < p->z.high[i] || p->z.high[i] >= p->physical_high[i]);
-    return inside;
+    integer i = 0;
+    while (i < p->n && (p->image.low[i] > p->z.low[i] || p->z.low[i] <= p->physical_low[i])
+           && (p->image.high[i] < p->z.high[i] || p->z.high[i] >= p->physical_high[i]))
+        i++;
+    return i;
 }
 
 /* Returns whether that narrows it by more than a little. */
@@ -100,17 +100,19 @@ static int find_box(plant *p, double h, outcome *found)
     if (!plant_rates(p, found)) return 0;
     take_image(p, h);
     span_copy(p->z, p->image, p->n);
+    integer leaves = 0;
     for (integer trial = 0; trial < TRIALS; trial++) {
         grow(p, trial);
         if (!plant_rates(p, found)) return 0;
         take_image(p, h);
-        if (image_is_inside(p)) {
+        leaves = first_outside(p);
+        if (leaves == p->n) {
             cut_by_image(p);
             return 1;
         }
         join_image(p);
     }
-    *found = (outcome){.code = NOT_ENCLOSED, .why = NO_BOX, .time = h};
+    *found = (outcome){.code = NOT_ENCLOSED, .why = NO_BOX, .row = leaves, .time = h};
     return 0;
 }
 

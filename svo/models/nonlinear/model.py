@@ -78,7 +78,8 @@ class NonlinearModel(Value, Shown):
         Where the equations hold. Where the state may leave it, the set starts again from ``largest``, and the verdict
         is "undecided".
     largest : (lower, upper), optional
-        Bounded; holds the state where a set starts again, and h holds there. By default ``physical``, which then must be bounded.
+        Bounded; holds the state where a set starts again, and h holds there. By default ``physical``, which then must
+        be bounded.
     continuous : bool
         False for equations in discrete time, x(k+1) = f(x(k), u(k), w(k), p(k)).
 

@@ -180,14 +180,15 @@ class PlantKernel:
         if found.code == _OUTSIDE_VALID:
             return self._flow.outside_valid(row, found.low, found.high)
         if found.code == _NOT_PHYSICAL:
-            return Undecided("no state of the set stays within the physical range")
+            return Undecided(f"no {state[row]} of the set stays within the physical range", coordinate=row)
         if found.code == _TOO_WIDE:
             return Undecided(f"the remainder of {state[row]} is wider than largest", coordinate=row)
         return Undecided(self._of_substep(found))
 
     def _of_substep(self, found: _Outcome) -> str:
         if found.why == _NO_BOX:
-            return f"no box was found that the state keeps to within {found.time:.3g} s"
+            state = self._flow.states[found.row]
+            return f"no box was found that the state keeps to within {found.time:.3g} s, {state} leaves all"
         return f"the equation of {self._flow.states[found.row]} is not enclosed, {why_not(found.reason, found.op)}"
 
 

@@ -112,7 +112,7 @@ def _moved(flow: Flow, C: Array, box: Span, u: Span, J: float) -> Array:
 
 def _around(flow: Flow, x: Span, u: Span, J: float) -> Span:
     """A box that holds x(t) for |t - s| <= J if x(s) is in ``x``; forward and back the same, as `Flow` says."""
-    box = x
+    box, inside = x, np.zeros(flow.n, dtype=bool)
     for trial in range(_TRIALS):
         image = _image(flow, x, box, u, J)
         room = (0.02 + 0.1 * trial) * (image.width - x.width) + 1e-9 * image.width + 1e-14 * image.largest + 1e-200
@@ -122,9 +122,11 @@ def _around(flow: Flow, x: Span, u: Span, J: float) -> Span:
         low, high = image.lower > box.lower, image.upper < box.upper
         if flow.physical is not None:
             low, high = low | (box.lower <= flow.physical.lower), high | (box.upper >= flow.physical.upper)
-        if (low & high).all():
+        inside = low & high
+        if inside.all():
             return Span(np.maximum(box.lower, image.lower), np.minimum(box.upper, image.upper))
-    raise Undecided(f"no box was found that the state keeps to within {J:.3g} s of a reading")
+    state = flow.states[int(np.argmin(inside))]
+    raise Undecided(f"no box was found that the state keeps to within {J:.3g} s of a reading, {state} leaves all")
 
 
 def _image(flow: Flow, x: Span, box: Span, u: Span, J: float) -> Span:

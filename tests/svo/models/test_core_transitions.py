@@ -203,8 +203,20 @@ def test_a_set_that_leaves_what_is_physical_is_undecided() -> None:
     model = NonlinearModel(
         lambda x, u: [u[0] - x[0]], lambda x: x, states=["h"], inputs=["Q"], Ts=1.0, physical=([0.0], [1.0])
     )
-    with pytest.raises(Undecided, match="no state of the set stays within the physical range"):
+    with pytest.raises(Undecided, match="no h of the set stays within the physical range"):
         model.transition([0.1], [0.2], [-3.0])
+
+
+def test_where_no_box_is_found_the_state_that_leaves_it_is_named() -> None:
+    model = NonlinearModel(
+        lambda x: [-x[0], 5000.0 * (x[0] - x[1])], lambda x: x, states=["slow", "fast"], n=0.1, jitter=1.0,
+        largest=([-9, -9], [9, 9]),
+    )  # fmt: skip
+    with pytest.raises(Undecided, match=r"would be needed: no box was found .* within 0.00391 s, fast leaves all"):
+        model.transition([0.5, 0.5], [0.6, 0.6])
+    box, nothing = np.array([[0.5, 0.5], [0.6, 0.6]]), np.zeros(0)
+    with pytest.raises(Undecided, match=r"no box was found .* within 1 s of a reading, (slow|fast) leaves all"):
+        model.output_near(*box, nothing, (nothing, nothing))
 
 
 def test_a_copy_of_a_model_has_a_kernel_of_its_own() -> None:

@@ -101,16 +101,18 @@ class Flow:
             room = (0.02 + 0.1 * trial) * growth + 1e-9 * box.width + 1e-14 * box.largest + 1e-200
             box = self.inside(Span(box.lower - room, box.upper + room))
             image = _image(start, self.ranges(box, u), h)
-            if self._is_inside(image, box):
+            inside = self._is_inside(image, box)
+            if inside.all():
                 return Span(np.maximum(box.lower, image.lower), np.minimum(box.upper, image.upper))
             box = Span(np.minimum(box.lower, image.lower), np.maximum(box.upper, image.upper))
-        raise Undecided(f"no box was found that the state keeps to within {h:.3g} s")
+        state = self.states[int(np.argmin(inside))]
+        raise Undecided(f"no box was found that the state keeps to within {h:.3g} s, {state} leaves all")
 
-    def _is_inside(self, image: Span, box: Span) -> bool:
+    def _is_inside(self, image: Span, box: Span) -> np.ndarray:
         low, high = image.lower > box.lower, image.upper < box.upper
         if self.physical is not None:
             low, high = low | (box.lower <= self.physical.lower), high | (box.upper >= self.physical.upper)
-        return bool((low & high).all())
+        return low & high
 
 
 def _at_faces(start: Span, forms: Forms) -> Span:

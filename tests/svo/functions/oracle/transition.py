@@ -165,8 +165,9 @@ def _newest(flow: Flow, found: Transition, start: Span, known: Span) -> Span:
     terms = np.abs(found.A) @ start.largest + np.abs(found.a) + np.abs(found.E) @ w.largest + spread
     spread = spread + 2.0 * (flow.n + len(w.lower) + 8) * _EPS * terms
     box = flow.inside(Span(np.maximum(y - spread, known.lower), np.minimum(y + spread, known.upper)))
-    if not (box.lower <= box.upper).all():
-        raise Undecided("no state of the set stays within the physical range")
+    meets = box.lower <= box.upper
+    if not meets.all():
+        raise Undecided(f"no {flow.states[int(np.argmin(meets))]} of the set stays within the physical range")
     return box
 
 
