@@ -91,7 +91,7 @@ EXPORTED integer fdi_prepared_ball(integer d, integer m, const double *rows, dou
     return 1;
 }
 
-static const double TIGHT = 1e-12; /* gap, of the terms, that rounding leaves */
+static const double TIGHT = 1e-14; /* gap, of the terms, that rounding leaves */
 
 typedef struct {
     double *forms, *found, *gaps;

@@ -120,6 +120,15 @@ def test_lower_bounds_of_supports_are_never_above_them_and_near() -> None:
     assert half is None or half.lower_supports(np.array([[0.0, 1.0]])) == [np.inf]
 
 
+def test_a_first_support_is_no_more_than_some_roundings_above_the_exact_one() -> None:
+    rng = np.random.default_rng(1)
+    body = HPolytope(np.vstack([rng.standard_normal((20, 5)), np.eye(5), -np.eye(5)]), np.ones(30))
+    P, near = body.project([3, 0, 1]), body.project_within([3, 0, 1], 0.05)
+    for c in near.outer.A[:8]:
+        above = Fraction(HPolytope(P.A, P.b).support(c)) - HPolytope(P.A, P.b).support(c, exact=True)
+        assert 0 <= above <= 1e-13
+
+
 def test_hulls_of_short_points_are_those_in_integers_of_any_size() -> None:
     rng, known = np.random.default_rng(1), 0
     for _ in range(150):
