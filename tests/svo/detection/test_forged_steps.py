@@ -47,14 +47,11 @@ HEALTHY: dict[str, tuple[list[float], bool, Steps]] = {
     # a bound that no row of its window is about
     "a bound after its window": ([0.9, 1.1], False, [bound(1, "upper", 0.0, 0, 0), alarm_of(1, -1.0, first=1)]),
     "a bound before its window": (
-        [1.1, 0.9], False, [start("physical"), bound(0, "upper", 0.0, 1, 1), alarm_of(0, -1.0)],
+        [0.9, 1.1, 1.2], False, [bound(1, "upper", 0.0, 2, 2), alarm_of(2, -1.0, 0.0, first=1)],
     ),
     # p <= 0.5 turned round: p >= 0.5
     "a negative multiplier of a line": (
         [0.9, 0.5], True, [FACTORS, *S_WITHIN, with_line(alarm_of(1, -1.0, 1.0), 0, 0, 0, line=(-1.0, 0.0, 0.5))],
-    ),
-    "a line of another channel": (
-        [0.9, 0.5], True, [FACTORS, *S_WITHIN, with_line(alarm_of(1, -1.0, 1.0), 0, 1, 0, line=(1.0, 0.0, 0.5))],
     ),
     # what an earlier start led to is forgotten with what it assumed
     "bounds of states of another start": (
@@ -87,6 +84,8 @@ def test_the_steps_that_are_forged_hold_where_they_are_in_place(tmp_path: Path) 
     assert "from sample 0 on, where the state is in its physical range" in premises[0]
     below = [FACTORS, *S_WITHIN, with_line(alarm_of(1, -1.0, 1.0), 0, 0, 1, line=(1.0, 0.0, -0.5))]
     assert claims(by_hand(tmp_path, [0.9, -0.2], True, below, 0))  # p >= -0.5
+    below[-1] |= {"on_line": [[0, 0, 1], [0, 1, 1]], "line": {"shape": [2, 3], "hex": "0x1p+0 0 -0x1p-1 0x1p+0 0 0"}}
+    assert claims(by_hand(tmp_path, [0.9, -0.2], True, below, 0)) == []  # a line of a channel that there is not
 
 
 @pytest.mark.parametrize("repeated", [slice(1, 3), slice(1, -1)])

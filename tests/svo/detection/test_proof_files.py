@@ -127,6 +127,16 @@ def test_a_proof_of_another_log_loses_nothing_though_it_was_cut_off(tmp_path: Pa
     assert proof.read_bytes() == content
 
 
+def test_a_proof_of_more_alarms_than_these_is_kept(tmp_path: Path) -> None:
+    log, plant = CART.with_suffix(".csv"), find_plant(str(CART))
+    found, proof = detect(plant, read_log(log, plant)), tmp_path / "proof.jsonl.gz"
+    assert verify(found, full=True, write_proof=proof).ok
+    content = proof.read_bytes()
+    with pytest.raises(ValueError, match="proofs of other alarms than these; give another name"):
+        verify(replace(found, alarms=found.alarms[:1]), full=True, write_proof=proof)
+    assert proof.read_bytes() == content
+
+
 def test_a_scheduled_plant_is_described_with_its_log(tmp_path: Path) -> None:
     done = CliRunner().invoke(
         app, ["describe", "eclipse", "--models", "lpv", "--noise", "quiet", "--out", str(tmp_path / "plant.json")]
