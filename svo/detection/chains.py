@@ -25,7 +25,6 @@ from svo.observers.window.certificate import OnWindow, WindowCertificate
 from svo.observers.window.chain import prover_of
 from svo.observers.window.chain_starts import Start, own_start
 from svo.observers.window.evidence import ArrivalSet
-from svo.observers.window.observer import WindowObserver
 from svo.observers.window.prover import ProvenChain
 from svo.observers.window.setup import rows_on_w
 from svo.plant import BankChoice, MonitoredPlant, with_bank
@@ -172,7 +171,8 @@ def verify_chains(path: str | Path, log: Log, plant: MonitoredPlant) -> list[Ala
     The model is that of the plant's bank for the noise set and architecture that the alarm names, and must be the
     alarm's. Of an observer that starts during the run, as those of class II do, the model is claimed to hold from
     there on, and the set that it starts from is used where the readings do not do: as given.
-    Bounds are proven over convex hulls; an alarm that only a split by signs gives fails, and the reason says so.
+    Bounds are proven over convex hulls, and of polytope observers at the vertices of Delta; an alarm may be split by
+    the signs of s.
 
     Parameters
     ----------
@@ -232,8 +232,7 @@ def _prove(models: PlantModels, alarm: Alarm) -> tuple[ProvenChain | None, str]:
     prover = prover_of(observer, first, log, *begun)
     found = prover.prove(alarm.sample)
     if found is None:
-        splits = isinstance(observer, WindowObserver) and observer.sign_split
-        return None, prover.reason + (", not split by signs as the plant's is" if splits else "")
+        return None, prover.reason
     over = f", over {found.bounds} bounds" if found.bounds else ""
     given = f", given {' and '.join(found.given)}" if found.given else ""
     return found, f"proven {found.start.begins}{over}{given}"

@@ -56,11 +56,13 @@ class HullProver:
 
     def prove(self, sample: int) -> ProvenChain | None:
         """The proof that no trajectory explains the readings up to a sample, or None; `reason` says why."""
-        found = self._windows.prove(sample)
-        return found if found is not None or not self._of.model.uncertainties else self.by_hulls(sample)
+        windows = self._windows
+        return windows.over_hulls(sample) or self.by_hulls(sample) or windows.by_signs(sample)
 
     def by_hulls(self, sample: int) -> ProvenChain | None:
-        """The same by explicit sets alone."""
+        """The same by explicit sets alone; without uncertainties a window says as much."""
+        if not self._of.model.uncertainties:
+            return None
         for start in self._windows.starts(sample):
             sets = _Sets(self._of, start, sample, self._max_facets)
             if sets.alarm is not None and sets.are_proven():

@@ -28,6 +28,7 @@ from svo.observers.window.linearised_prover import LinearisedProver
 from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.observer import WindowObserver
 from svo.observers.window.prover import ChainProver, ProvenChain
+from svo.observers.window.sign_split import SplitCertificate
 
 Prover = ChainProver | HullProver | LinearisedProver
 
@@ -46,7 +47,7 @@ class ChainCheck(Shown):
         Bounds of states and channels that the proof takes.
     unproven : tuple of str
         What was not proven: bounds and their samples, or the falsification itself.
-    certificate : WindowCertificate or None
+    certificate : WindowCertificate, SplitCertificate or None
         Of the proof's last window; None without a proof.
     seconds : float
         Wall time that it took [s].
@@ -58,7 +59,7 @@ class ChainCheck(Shown):
     falsified_at: int | None
     bounds: int
     unproven: tuple[str, ...]
-    certificate: WindowCertificate | None
+    certificate: WindowCertificate | SplitCertificate | None
     seconds: float
     given: tuple[str, ...] = ()
 
@@ -82,9 +83,7 @@ class LateMeasurement(Shown):
     y: Array
 
 
-def prover_of(
-    observer: Observer, first: ArrivalSet, log: Log, since: int, begun: Start | None
-) -> Prover:
+def prover_of(observer: Observer, first: ArrivalSet, log: Log, since: int, begun: Start | None) -> Prover:
     """What proves falsifications of an observer's model, by directions of its own if it has some.
 
     ``first`` was its set at its first sample, and it ran from ``begun`` on; ``since`` the model is claimed to hold.
@@ -106,8 +105,8 @@ def prove_chain(observer: WindowObserver, log: Log, late: Iterable[LateMeasureme
     Parameters
     ----------
     observer : WindowObserver
-        Gives the model, the initial set and its options; it is left as it is. The proof keeps convex hulls even where
-        the observer splits by signs.
+        Gives the model, the initial set and its options; it is left as it is. The proof keeps convex hulls where they
+        do, and splits its last window by signs where they do not.
     log : Log
         With NaN where a measurement came late.
     late : iterable of LateMeasurement

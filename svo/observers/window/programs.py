@@ -131,6 +131,14 @@ class Programs:
                 return "falsified"
         return "consistent" if has_point else self.undecided(NO_PROOF)
 
+    def by_signs(self, cells: int) -> SplitCertificate | None:
+        """The proof that the window is empty whatever the signs of its s, in at most so many cells, if found."""
+        split, arrays = SplitPrograms(self.memory, self.certificate, cells), self.memory.arrays
+        if not split.is_needed:
+            return None
+        proof = split.solve(kernel.ARRIVAL, 0, lambda: float(arrays["new_upper"][0])).proof
+        return proof if proof is not None and proof.verify() else None
+
     def _ask_highs(self) -> VerdictName:
         arrays = self.memory.arrays
         feasible, ray = is_feasible(arrays["G"], arrays["lower"], arrays["upper"])

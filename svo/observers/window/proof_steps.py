@@ -5,6 +5,7 @@ Everything is in the user's units, and samples are those of the log.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from svo.checks import Array
 from svo.observers.window.certificate import WindowCertificate
 from svo.observers.window.chain_starts import Start
 from svo.observers.window.evidence import ArrivalSet
+from svo.observers.window.sign_split import SplitCertificate
 from svo.observers.window.window import Window
 from svo.store.values import encode_value
 
@@ -50,13 +52,23 @@ class ProofSteps:
         unit = form.x[row] if row < len(form.x) else 1.0
         self._add("x", proof, unit, sample=sample, row=row, side=SIDES[side], value=value * unit)
 
-    def alarm(self, proof: WindowCertificate) -> None:
-        """The falsification."""
-        self._add("alarm", proof)
+    def alarm(self, proof: WindowCertificate | SplitCertificate) -> None:
+        """The falsification, by cases where the window is split by signs."""
+        if isinstance(proof, WindowCertificate):
+            self._add("alarm", proof)
+            return
+        self._choose_channels(proof.about())
+        self.steps.append({"step": "alarm", **cases(proof.cells, proof.s_lower, proof.s_upper)})
 
     def _add(self, kind: str, proof: WindowCertificate, unit: float = 1.0, **entries: Any) -> None:
         if not np.isfinite(entries.get("value", 0.0)):
             return  # says nothing
+        self._choose_channels(proof)
+        if "value" in entries:
+            entries["value"] = float(entries["value"]).hex()
+        self.steps.append({"step": kind, **entries, **multipliers(proof, unit)})
+
+    def _choose_channels(self, proof: WindowCertificate) -> None:
         for k, s in enumerate(proof.samples, start=proof.first):
             if s.gain is None or s.functional is None:
                 continue  # none that floats can hold: the checker leaves all of it out
@@ -64,9 +76,6 @@ class ProofSteps:
                 self._channels[k] = key
                 factors = {"gain": encode_value(s.gain), "functional": encode_value(s.functional)}
                 self.steps.append({"step": "channels", "sample": k, "owner": proof.owner.tolist(), **factors})
-        if "value" in entries:
-            entries["value"] = float(entries["value"]).hex()
-        self.steps.append({"step": kind, **entries, **multipliers(proof, unit)})
 
 
 def start_step(start: Start, template: Array) -> dict[str, Any]:
@@ -83,6 +92,25 @@ def start_step(start: Start, template: Array) -> dict[str, Any]:
 def encode_set(of: ArrivalSet) -> dict[str, Any]:
     """A set as JSON can hold it."""
     return dict(encode_value(of))
+
+
+def cases(cells: Sequence[WindowCertificate], lower: Array, upper: Array) -> dict[str, Any]:
+    """Entries of a step: multipliers of the only cell, or two cases by the sign of an s that all cells are split by.
+
+    ``lower`` and ``upper`` (samples, nq) are bounds of every s that the cells cover.
+    """
+    if len(cells) == 1:
+        return multipliers(cells[0], 1.0)
+    ends = [np.array([[getattr(s, name) for s in c.samples] for c in cells]) for name in ("s_lower", "s_upper")]
+    below, above = (ends[1] == 0.0) & (upper > 0.0), (ends[0] == 0.0) & (lower < 0.0)
+    k, q = np.argwhere((below != above).all(axis=0))[0].tolist()
+    parts = []
+    for is_mine, end in ((below[:, k, q], upper), (above[:, k, q], lower)):
+        known = end.copy()
+        known[k, q] = 0.0
+        bounds = (lower, known) if end is upper else (known, upper)
+        parts.append(cases([c for c, mine in zip(cells, is_mine, strict=True) if mine], *bounds))
+    return {"split": [cells[0].first + k, q], "cases": parts}
 
 
 def multipliers(c: WindowCertificate, unit: float) -> dict[str, Any]:

@@ -28,10 +28,12 @@ from svo.observers.window.log_model import ModelOnLog
 from svo.observers.window.memory import Memory, WindowSettings
 from svo.observers.window.proof_steps import ProofSteps
 from svo.observers.window.sample import Outgrown
+from svo.observers.window.sign_split import SplitCertificate
 from svo.observers.window.window import Window
 
 _EPS = 1e-9  # of the windows: their bounds are that much wider than what is proven of the model
 _NEAREST, _FARTHEST = 4, 256  # samples before the alarm at which chains from no set of their own begin
+_MOST_CELLS = 256  # of a window that is split by signs
 _WHOLE, _HORIZON, _STRIDE = 64, 32, 24  # samples of a window that keeps all; of one that slides, and by how many
 
 
@@ -44,7 +46,7 @@ class ProvenChain(Shown):
     start : Start
     bounds : int
         Bounds of states and channels that it takes.
-    certificate : WindowCertificate or None
+    certificate : WindowCertificate, SplitCertificate or None
         Of its last window; None where one reading excludes what is known.
     steps : list of dict
         As `docs/proof_format.md` has them.
@@ -54,7 +56,7 @@ class ProvenChain(Shown):
 
     start: Start
     bounds: int
-    certificate: WindowCertificate | None
+    certificate: WindowCertificate | SplitCertificate | None
     steps: list[dict[str, Any]]
     given: tuple[str, ...]
 
@@ -82,15 +84,26 @@ class ChainProver:
     def reason(self) -> str:
         """Why the last claim was not proven."""
         if not self.unproven:
-            return "no chain of windows over convex hulls is falsified"
+            return "no chain of windows is falsified, over convex hulls or split by signs"
         return f"{len(self.unproven)} bounds are not proven, first: {self.unproven[0]}"
 
     def prove(self, sample: int) -> ProvenChain | None:
         """The proof that no trajectory explains the readings up to a sample, or None; `reason` says why."""
+        return self.over_hulls(sample) or self.by_signs(sample)
+
+    def over_hulls(self, sample: int) -> ProvenChain | None:
+        """The same of windows with the convex hull of each p = Delta s."""
         self.unproven = ()
+        return self._of_windows(sample, 0)
+
+    def by_signs(self, sample: int) -> ProvenChain | None:
+        """The same, with the last window in cells, by the signs of its channels' s."""
+        return self._of_windows(sample, _MOST_CELLS) if self._of.model.uncertainties else None
+
+    def _of_windows(self, sample: int, cells: int) -> ProvenChain | None:
         for start in self.starts(sample):
-            if self._falsified(self._window(start, sample, None), sample):
-                found = self._proven(start, sample)
+            if self._emptiness(self._window(start, sample, None), sample, cells) is not None:
+                found = self._proven(start, sample, cells)
                 if found is not None:
                     return found
         return None
@@ -121,24 +134,27 @@ class ChainProver:
         anchor = replace(anchor, box_lower=lower, box_upper=upper)
         return Window(settings, anchor, origin=start.sample, prover=prover)
 
-    def _falsified(self, window: Window, sample: int) -> bool:
+    def _emptiness(self, window: Window, sample: int, cells: int) -> WindowCertificate | SplitCertificate | None:
+        """The proof that a window is empty once it has the samples up to one; None if there is none."""
         try:
-            return any(window.take(self._of.sample(k)) == "falsified" for k in range(window.origin, sample + 1))
+            for k in range(window.origin, sample + 1):
+                if window.take(self._of.sample(k)) == "falsified":
+                    return window.proof
         except Outgrown:
-            return False
+            return None
+        return window.by_signs(cells) if cells else None
 
-    def _proven(self, start: Start, sample: int) -> ProvenChain | None:
+    def _proven(self, start: Start, sample: int, cells: int) -> ProvenChain | None:
         """The same again, program by program, with each bound proven and written down."""
         steps = ProofSteps(start, self._template)
         prover = BoundProver(steps)
         window = self._window(start, sample, prover)
-        if not self._falsified(window, sample):
+        proof = self._emptiness(window, sample, cells)
+        if proof is None:
             return None
         if prover.unproven:
             self.unproven = tuple(prover.unproven)
             return None
-        proof = window.proof
-        assert isinstance(proof, WindowCertificate)  # hulls are kept
         steps.alarm(proof)
         return ProvenChain(start, prover.checked, proof, steps.steps, self.given(start))
 

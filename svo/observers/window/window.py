@@ -90,6 +90,10 @@ class Window:
         """That the window is empty, about the model and the data as given."""
         return self._programs.proof
 
+    def by_signs(self, cells: int) -> SplitCertificate | None:
+        """A proof that it is empty whatever the signs of its s, in at most so many cells; None if none was found."""
+        return self._programs.by_signs(cells)
+
     @property
     def reason(self) -> str | None:
         """Why the newest verdict is "undecided", where that is known."""

@@ -25,3 +25,16 @@ def turning(seed: int) -> tuple[Made, Log]:
     plant = Made(model)
     plant.kind = PolytopeObserver
     return plant, log
+
+
+def of_both_signs(seed: int) -> tuple[Made, Log]:
+    """Of two states of either sign, of which one is read now and then, and a wide uncertainty of rank one."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(2, 2))
+    A *= 0.9 / np.abs(np.linalg.eigvals(A)).max()
+    item = Uncertainty(A=np.outer(rng.normal(size=2), rng.normal(size=2)))
+    model = UncertainModel(A, rng.normal(size=(2, 1)), np.eye(2), n=[0.05, 0.05], Ts=1.0, uncertainties=[item])
+    log = model.simulate(rng.uniform(-0.5, 0.5, 2), 0.3 * rng.normal(size=(8, 1)), rng)
+    y = np.where(rng.random(log.y.shape) < 0.4, np.nan, log.y)
+    y[4:, 0] += rng.uniform(0.1, 1.0)
+    return Made(model, horizon=7, sign_split=200), Log(log.time, log.u, y)

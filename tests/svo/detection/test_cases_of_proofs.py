@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from checkers import CHECK
-from hull_plants import turning
+from hull_plants import of_both_signs, turning
 from proof_cases import Files, answer, claims, proven, steps_of, with_steps
 from test_checker_on_trajectories import SAMPLES, Trajectory, array, exact
 
@@ -231,13 +231,13 @@ def hulls(tmp_path_factory: pytest.TempPathFactory) -> Files:
 
 
 def first_reason_is_windows(seed: int) -> bool:
-    """Whether no window proves what the polytope observer found."""
+    """Whether no window over hulls proves what the polytope observer found."""
     plant, log = turning(seed)
     observer = plant.bank("stated").observers["nominal"]
     at, start = observer.run(log).falsified_at, observer.first_set
     prover = prover_of(observer, start, log, 0, own_start(None, start))._windows  # type: ignore[union-attr]
     assert isinstance(prover, ChainProver)
-    return at is not None and prover.prove(at) is None
+    return at is not None and prover.over_hulls(at) is None
 
 
 @pytest.mark.parametrize("seed", [5, *(pytest.param(s, marks=pytest.mark.slow) for s in range(60) if s != 5)])
@@ -249,6 +249,33 @@ def test_alarms_of_hulls_are_proven(seed: int, tmp_path: Path) -> None:
     code, text = answer(*files)
     assert code == 0, text
     assert any("vertices" in step for step in steps_of(files[0])) is first_reason_is_windows(seed)
+
+
+@pytest.mark.parametrize("seed", [38, *(pytest.param(s, marks=pytest.mark.slow) for s in range(120) if s != 38)])
+def test_alarms_that_a_split_by_signs_gives_are_proven(seed: int, tmp_path: Path) -> None:
+    """Seeds 7, 38, 81 and 111 by a split, of which that of 38 has four cells; the others by hulls."""
+    files = proven(*of_both_signs(seed), tmp_path)
+    if files is None:
+        return
+    code, text = answer(*files)
+    assert code == 0, text
+    (alarm,) = (step for step in steps_of(files[0]) if step.get("step") == "alarm")
+    assert ("split" in alarm) is (seed in (7, 38, 81, 111))
+    if seed == 38:
+        for forge in (one_sign, exchanged_signs, first_sign_for_both):
+            assert claims(edited(files, lambda steps, forge=forge: forge(steps[-1]))) == []  # type: ignore[misc]
+
+
+def one_sign(alarm: dict[str, Any]) -> None:
+    alarm["cases"].pop()
+
+
+def exchanged_signs(alarm: dict[str, Any]) -> None:
+    alarm["cases"] = alarm["cases"][::-1]
+
+
+def first_sign_for_both(alarm: dict[str, Any]) -> None:
+    alarm["cases"] = alarm["cases"][:1] * 2
 
 
 def edited(files: Files, change: Callable[[list[Any]], None]) -> Files:

@@ -18,6 +18,9 @@ from svo.detection.chains import verify_chains
 from svo.isolation.alarms import Alarm, verify_alarms, write_alarms
 from svo.logs.drive import drive
 from svo.logs.log import Log
+from svo.observers.window.chain import prover_of
+from svo.observers.window.chain_starts import own_start
+from svo.observers.window.prover import ChainProver
 from svo.observers.window.sign_split import SplitCertificate
 from tests.svo.observers import oracle
 from tests.svo.observers.random_plants import random_plant
@@ -167,22 +170,25 @@ class SplitPlant:
         return ArchitectureI(WindowObserver(model, HPolytope.box([-1, -1], [1, 1]), horizon=4, sign_split=ENOUGH), {})
 
 
-@pytest.mark.parametrize(("last", "sample"), [([0.0, np.nan], None), ([3.0, np.nan], 2)])
-def test_a_chain_is_proven_over_hulls_or_says_that_it_would_need_the_split(
-    last: list[float], sample: int | None, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize(("last", "by_hulls"), [([0.0, np.nan], False), ([3.0, np.nan], True)])
+def test_a_chain_is_proven_over_hulls_or_split_by_signs(last: list[float], by_hulls: bool, tmp_path: Path) -> None:
     y = np.array([[np.nan, np.nan], [np.nan, 0.9], last])
     log, plant = Log(time=np.arange(3.0), u=np.zeros((3, 0)), y=y), SplitPlant()
     alarms = alarms_of(plant.bank("").run(log), log, {"plant": "split", "noise": ""})
     write_alarms(tmp_path / "alarms.jsonl", alarms)
     (check,) = verify_chains(tmp_path / "alarms.jsonl", log, plant)  # type: ignore[arg-type]
-    assert check.ok == (sample is not None)
-    words = (
-        "proven from the first sample"
-        if check.ok
-        else "over convex hulls is falsified, not split by signs as the plant's is"
-    )
-    assert words in check.reason
+    assert check.ok
+    assert "proven from the first sample" in check.reason
+    observer = plant.bank("").observers["nominal"]
+    start = observer.first_set
+    assert start is not None
+    prover = prover_of(observer, start, log, 0, own_start(None, start))
+    assert isinstance(prover, ChainProver)
+    assert (prover.over_hulls(2) is not None) is by_hulls
+    found = prover.by_signs(2)
+    assert found is not None
+    assert found.certificate is not None
+    assert found.certificate.verify()
 
 
 def test_a_step_with_a_deadline_keeps_the_hull() -> None:
