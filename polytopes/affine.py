@@ -91,9 +91,11 @@ class AffineSet:
         """
         if not self.pivots:
             return A, b
-        reduced, rhs = A @ self.basis, b - A @ self.point
-        magnitude = np.abs(A) @ np.abs(self.basis)
-        cancelled = (np.abs(reduced) < 1e-3 * magnitude).any(axis=1) if self.free else np.ones(len(b), bool)
+        with np.errstate(over="ignore", invalid="ignore"):  # beyond floats on the way: formed exactly too
+            reduced, rhs = A @ self.basis, b - A @ self.point
+            magnitude = np.abs(A) @ np.abs(self.basis)
+        known = ((np.abs(reduced) >= 1e-3 * magnitude) & np.isfinite(magnitude)).all(axis=1) & np.isfinite(rhs)
+        cancelled = ~known if self.free else np.ones(len(b), bool)
         for i in np.flatnonzero(cancelled).tolist():
             row, constant = self.restricted_row(A[i], b[i])
             reduced[i], rhs[i] = to_floats(row), to_floats([constant])[0]
@@ -102,7 +104,8 @@ class AffineSet:
     def restriction_errors(self, A: Floats, b: Floats) -> tuple[Floats, Floats]:
         """Bounds of what `restrict` rounds: arrays (m, free) and (m,), zero for sums that are floats all along."""
         solution = np.hstack([self.basis, self.point[:, None]])
-        reach = np.abs(A) @ np.abs(solution)
+        with np.errstate(over="ignore"):  # a bound that is infinite proves nothing
+            reach = np.abs(A) @ np.abs(solution)
         reach[:, -1] += np.abs(b)
         errors = (self.dim + 6) * _EPS * reach
         if not self._rounded:
@@ -136,11 +139,14 @@ class AffineSet:
 
     def restricted_row(self, row: Floats, rhs: float) -> tuple[list[fmpq], fmpq]:
         """One row ``row'x <= rhs`` on the set, exactly: its coefficients in the free coordinates and its constant."""
-        exact = rational_vector(row)
-        coefficients, constant = [exact[j] for j in self.free], rational(rhs)
+        return self.restricted_form(rational_vector(row), rational(rhs))
+
+    def restricted_form(self, exact: list[fmpq], rhs: fmpq) -> tuple[list[fmpq], fmpq]:
+        """The same of a row in rationals."""
+        coefficients, constant = [exact[j] for j in self.free], rhs
         for k, j in enumerate(self.pivots):
             if exact[j] != 0:
-                constant -= exact[j] * self.solved[k, len(self.free)]
+                constant = constant - exact[j] * self.solved[k, len(self.free)]
                 for q in range(len(self.free)):
                     coefficients[q] -= exact[j] * self.solved[k, q]
         return coefficients, constant

@@ -38,7 +38,8 @@ class Bounds:
 
 def _raised(values: Floats, spare: Floats, more: Floats) -> Floats:
     """Floats that are at least ``values - spare + more``."""
-    return np.where(more > spare, np.nextafter(values + more, np.inf), values)
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond floats: no bound
+        return np.where(more > spare, np.nextafter(values + more, np.inf), values)
 
 
 def equality_multipliers(C: Floats, d: Floats, forms: Floats) -> Floats:

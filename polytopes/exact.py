@@ -29,8 +29,11 @@ def power_of_two(exponent: int) -> fmpq:
 
 
 def rounded_up(value: fmpq) -> float:
-    """The smallest float that is at least `value`."""
-    number = int(value.p) / int(value.q)
+    """The smallest float that is at least `value`; inf beyond all floats."""
+    try:
+        number = int(value.p) / int(value.q)
+    except OverflowError:
+        return np.inf if value > 0 else -float(np.finfo(np.float64).max)
     return number if rational(number) >= value else float(np.nextafter(number, np.inf))
 
 

@@ -68,10 +68,9 @@ def exact_feasibility(A: Floats, b: Floats, flat: AffineSet, guess: Floats, stri
     return ExactOutcome(result.status, result.point[:-1], result.value, result.multipliers)
 
 
-def exact_maximum(A: Floats, b: Floats, flat: AffineSet, direction: Floats, start: list[fmpq]) -> ExactOutcome:
-    """Maximise ``direction' x`` from a point that satisfies every row exactly."""
-    objective = rational_vector(direction)
-    return _ascend(rational_matrix(A), rational_matrix(b), _fixed_rows(flat, 0), flat.free, objective, start, None)
+def exact_maximum(A: Floats, b: Floats, flat: AffineSet, form: list[fmpq], start: list[fmpq]) -> ExactOutcome:
+    """Maximise ``form' x`` from a point that satisfies every row exactly."""
+    return _ascend(rational_matrix(A), rational_matrix(b), _fixed_rows(flat, 0), flat.free, form, start, None)
 
 
 def _fixed_rows(flat: AffineSet, extra: int) -> list[list[fmpq]]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from polytopes.affine import AffineSet
 from polytopes.checks import Floats
 from polytopes.derived import derived
-from polytopes.exact import power_of_two, to_floats
+from polytopes.exact import ZERO, power_of_two, rational, to_floats
 from polytopes.exact_simplex import ExactOutcome, affordable, exact_feasibility, exact_maximum
 
 Exponents = NDArray[np.int64]
@@ -52,7 +52,11 @@ class EvenRows:
     def maximum(self, direction: Floats, start: list[fmpq]) -> ExactOutcome:
         """`exact_maximum` from a point that satisfies every row, everything in the user's units."""
         even = [v * power_of_two(-int(p)) for v, p in zip(start, self.columns, strict=True)]
-        return self._in_users_units(exact_maximum(*self._even, np.ldexp(direction, self.columns), even))
+        return self._in_users_units(exact_maximum(*self._even, self._even_form(direction), even))
+
+    def _even_form(self, direction: Floats) -> list[fmpq]:
+        """``c'x`` as a form in even units, where it may be beyond floats."""
+        return [rational(v) * power_of_two(int(p)) for v, p in zip(direction.tolist(), self.columns, strict=True)]
 
     def bound(self, direction: Floats, weights: Floats) -> tuple[fmpq, dict[int, fmpq]] | None:
         """The exact bound of ``c'x`` by the rows that carry float multipliers (m,), and the exact multipliers.
@@ -62,7 +66,7 @@ class EvenRows:
         used = np.flatnonzero(weights).tolist()
         A, b, flat = self._even
         rows = [flat.restricted_row(A[i], b[i]) for i in used]
-        form, constant = flat.restricted_row(np.ldexp(direction, self.columns), 0.0)
+        form, constant = flat.restricted_form(self._even_form(direction), ZERO)
         entries = [v for j in range(len(form)) for v in [*(row[j] for row, _ in rows), form[j]]]
         reduced, rank = fmpq_mat(len(form), len(used) + 1, entries).rref()
         leading = [next(j for j in range(len(used) + 1) if reduced[k, j] != 0) for k in range(rank)]

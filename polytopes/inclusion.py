@@ -72,7 +72,8 @@ def broken_row(P: Rows, Q: Rows) -> int | None:
     if not asked.size or not known_nonempty(Q):
         return None
     best = Q.program.maximise(normals[asked])
-    excess = best.values - sides[asked]
+    with np.errstate(over="ignore"):
+        excess = best.values - sides[asked]
     doubtful = np.flatnonzero(~(excess <= 0.0))
     for k in doubtful[np.argsort(-np.nan_to_num(excess[doubtful], nan=-np.inf), kind="stable")].tolist():
         normal, side = normals[asked[k]], float(sides[asked[k]])

@@ -66,14 +66,15 @@ def exact_product(A: Floats, M: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     and, together, below 2^53 of it.
     """
     rows, columns = lowest_bit(A).min(axis=1, initial=0), lowest_bit(M).min(axis=0, initial=0)
-    with np.errstate(over="ignore"):
-        limit = np.ldexp(_EXACT, rows[:, None] + columns[None])
-    return A @ M, np.abs(A) @ np.abs(M) <= limit
+    with np.errstate(over="ignore", invalid="ignore"):
+        limit, reach = np.ldexp(_EXACT, rows[:, None] + columns[None]), np.abs(A) @ np.abs(M)
+        return A @ M, (reach <= limit) & (reach < np.inf)
 
 
 def whole(table: Floats, terms: int) -> bool:
     """Whether entries are so small multiples of 2^-13 that sums of so many of their products with others are floats."""
-    parts = table * _PARTS
+    with np.errstate(over="ignore"):
+        parts = table * _PARTS
     return bool(np.abs(parts).max(initial=0.0) * terms < _HALF_EXACT and (parts == np.rint(parts)).all())
 
 

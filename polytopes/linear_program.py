@@ -34,6 +34,7 @@ CLEAN = 1e-9  # relative gap between a maximum and its bound that is still accep
 SHARP = 1e-6  # the same gap, of the radius of a largest ball
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
 SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
+_NOTHING = -(2**20)  # exponent of zero
 _NOISE = 1e-15  # width, relative to the coordinates, that may be rounding
 _EVEN_POWERS = 2  # exponents of two by which the units of the axes may differ from even ones
 _UNEVEN = 256.0  # ratio of the widths along two axes from which the axes are scaled
@@ -262,9 +263,9 @@ class Program:
         check_rounding()
         program = self.balanced
         k = directions.shape[0]
-        reduced, tops, constants = program._scaled_forms(directions)
+        reduced, tops, constants, whole = program._scaled_forms(directions)
         found = program._solve(reduced)
-        with np.errstate(over="ignore"):  # a bound beyond floats: none above, the least float below
+        with np.errstate(over="ignore", invalid="ignore"):  # a bound beyond floats: none above, the least float below
             values = np.ldexp(program._proved(directions, reduced, tops, found), tops)
         values = np.maximum(values, -np.finfo(np.float64).max)
         values = program._with_constants(directions, values, constants)
@@ -274,9 +275,9 @@ class Program:
         multipliers[:, self.kept] = np.minimum(weights, np.finfo(np.float64).max)
         inside = program._keeps(found.points)
         for q, name in enumerate(found.status):
-            if name == UNBOUNDED and not self.thin:  # of a thin set, floats take an edge for a ray
+            if name == UNBOUNDED and whole[q] and not self.thin:  # of a thin set, floats take an edge for a ray
                 values[q] = np.inf
-            elif name != OPTIMAL or not inside[q]:
+            elif name != OPTIMAL or not inside[q] or not whole[q]:
                 guess = lifted[q], multipliers[q]
                 answer = program._by_exact_multipliers(directions[q], *guess) if inside[q] else None
                 answer = answer or program._maximise_carefully(directions[q], reduced[q], tops[q])
@@ -289,20 +290,23 @@ class Program:
         For questions with a tolerance; nothing is proved.
         """
         program = self.balanced
-        reduced, tops, constants = program._scaled_forms(directions)
+        reduced, tops, constants, _ = program._scaled_forms(directions)
         found = program._solve(reduced)
         values = np.ldexp((reduced * found.points).sum(axis=1), tops) - constants
         solved = np.array([name == OPTIMAL for name in found.status], dtype=bool)
         values[~solved] = self.maximise(directions[~solved]).values
         return values
 
-    def _scaled_forms(self, directions: Floats) -> tuple[Floats, Indices, Floats]:
+    def _scaled_forms(self, directions: Floats) -> tuple[Floats, Indices, Floats, NDArray[np.bool_]]:
         """Forms (k, free) in the coordinates of the program, their largest entries about one, what they were divided by
-        (exponents of two), and their values on the affine set at the origin of its coordinates, negative."""
+        (exponents of two), their values on the affine set at the origin of its coordinates, negative, and whether no
+        bit of an entry was lost beside the largest."""
         rows, constants = self.flat.restrict(directions, np.zeros(len(directions)))
-        reduced = np.ldexp(rows, self.powers)
-        tops = np.frexp(np.abs(reduced).max(axis=1, initial=0.0))[1]
-        return np.ldexp(reduced, -tops[:, None]), tops, constants
+        sizes = np.where(rows != 0.0, np.frexp(rows)[1] + self.powers, _NOTHING)
+        tops = sizes.max(axis=1, initial=_NOTHING)
+        tops[tops == _NOTHING] = 0
+        reduced = np.ldexp(rows, self.powers - tops[:, None])
+        return reduced, tops, constants, (np.ldexp(reduced, tops[:, None] - self.powers) == rows).all(axis=1)
 
     def _proved(self, directions: Floats, reduced: Floats, tops: Indices, found: _Solved) -> Floats:
         """Upper bounds (k,) of the scaled forms; a form whose bound is not near its maximum becomes undecided."""

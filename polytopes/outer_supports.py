@@ -63,13 +63,20 @@ def lower_supports(P: Rows, directions: Floats) -> Floats:
     """
     best = maxima(P, directions)
     assert best is not None
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond floats: no bound
+        lower = _drawn_inward(P, directions, best.points)
+    return np.where(np.isfinite(lower), lower, -np.inf)
+
+
+def _drawn_inward(P: Rows, directions: Floats, points: Floats) -> Floats:
+    """Values (k,) at points (k, n) drawn towards the centre of a largest ball, less their rounding."""
     centre, unit = P.program.interior.point, (P.dim + 3) * _EPS
-    rounding = unit * (np.abs(best.points) @ np.abs(P.A.T) + np.abs(P.b))
-    broken = np.maximum(best.points @ P.A.T - P.b, 0.0) + rounding
+    rounding = unit * (np.abs(points) @ np.abs(P.A.T) + np.abs(P.b))
+    broken = np.maximum(points @ P.A.T - P.b, 0.0) + rounding
     room = np.maximum(P.b - P.A @ centre - unit * (np.abs(P.A) @ np.abs(centre) + np.abs(P.b)), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         back = np.where(P.A.any(axis=1), broken / (broken + room), 0.0).max(axis=1, initial=0.0)
-    values, sizes = (directions * best.points).sum(axis=1), (np.abs(directions) * np.abs(best.points)).sum(axis=1)
+    values, sizes = (directions * points).sum(axis=1), (np.abs(directions) * np.abs(points)).sum(axis=1)
     drawn = values - back * np.maximum(values - directions @ centre, 0.0)
     return np.asarray(drawn - 3.0 * unit * (np.abs(directions) @ np.abs(centre) + sizes))
 

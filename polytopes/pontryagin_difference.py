@@ -43,7 +43,8 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
     short = P.short and Q.short
     near = None
     if not short and Q.wide:
-        near = P.A, np.nextafter(P.b - lower_supports(Q, P.A), np.inf), P.C, P.d
+        with np.errstate(over="ignore"):  # the least float is above what is below all
+            near = P.A, np.nextafter(P.b - lower_supports(Q, P.A), np.inf), P.C, P.d
         if _clear(Rows(*near).program, P.b):
             return near
     exact = exact_supports(Q, np.vstack([P.A, P.C, -P.C]))
