@@ -7,10 +7,15 @@ from numpy.typing import NDArray
 
 from polytopes.answers import Answer
 from polytopes.checks import Floats
+from polytopes.errors import UndecidedError
 from polytopes.inclusion import half_spaces
+from polytopes.integers import up
 from polytopes.lengths import evened, lengths
+from polytopes.outer_supports import exact_support
 from polytopes.rows import Rows
 from polytopes.support import known_nonempty, support_points, supports_at_once
+
+_DOUBTFUL = 1e-6  # of its terms: what a row is broken by that may be the error of a support
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,10 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
         return Containment(True)
     normals, sides = evened(*half_spaces(P))
     sizes = lengths(normals)
-    beyond = _supports(Q, normals) - sides
+    values = _supports(Q, normals)
+    beyond = values - sides
+    for i in np.flatnonzero(~(beyond <= tol * sizes) & (beyond <= _DOUBTFUL * (np.abs(values) + np.abs(sides)))):
+        beyond[i] = _settled(Q, normals[i], values[i]) - sides[i]
     broken = ~(beyond <= tol * sizes)
     if not broken.any():
         return Containment(True)
@@ -76,6 +84,14 @@ def _supports(Q: Rows, normals: Floats) -> Floats:
     """Supports of a nonempty set as floats see them: along what is no ray but for rounding they are finite."""
     values = None if Q.prepared is None else Q.prepared.supports(normals)
     return values if values is not None and (values < np.inf).all() else Q.program.estimate(normals)
+
+
+def _settled(Q: Rows, normal: Floats, value: float) -> float:
+    """A support that is found too large where rows nearly repeat: the exact one, if it is smaller and can be had."""
+    try:
+        return min(float(value), up(exact_support(Q, normal)))
+    except UndecidedError:
+        return float(value)
 
 
 def _beyond(Q: Rows, normal: Floats, side: float, tol: float) -> Floats | None:

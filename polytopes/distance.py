@@ -163,13 +163,14 @@ def _root(squared: Fraction) -> tuple[float, float, float]:
 def _by_program(P: Rows, F: Floats, g: Floats, norm: float, ends: Ends) -> Distance:
     """The least ``|F y - g|`` over P by a linear program."""
     lifted, least = _program(P, F, g, norm)
+    exact = exact_maximum_of(lifted, least)
+    if exact is not None:
+        maximum, at = exact
+        return Distance(float(-maximum), -up(maximum), up(-maximum), *ends(at[: P.dim]))
     best = maxima(lifted, least[None])
     assert best is not None
     y = best.points[0, : P.dim]
     point, other = ends(y)
-    exact = exact_maximum_of(lifted, least)
-    if exact is not None:
-        return Distance(float(-exact), -up(exact), up(-exact), point, other)
     value, lower = float(np.linalg.norm(F @ y - g, norm)), max(0.0, -float(best.values[0]))
     return Distance(value, min(lower, value), value * (1.0 + 1e-12), point, other)
 

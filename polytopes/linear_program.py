@@ -314,7 +314,7 @@ class Program:
         if self.flat.pivots:
             of_rows, of_rhs = self.errors
             of_forms = self.flat.restriction_errors(directions, np.zeros(len(directions)))[0]
-            beside = np.ldexp(np.ldexp(of_forms, self.powers), -tops[:, None])
+            beside = np.ldexp(of_forms, self.powers - tops[:, None])
             bounds = bounds.widened(found.weights @ of_rhs, beside + found.weights @ of_rows)
         reach = self._reach if bounds.beside.any() else np.zeros(self.powers.size)
         values, gap, terms = bounds.gaps(reduced, found.points, reach)

@@ -13,6 +13,7 @@ import numpy as np
 from polytopes.checks import Floats
 from polytopes.duality import equality_multipliers
 from polytopes.errors import UndecidedError
+from polytopes.exact import to_floats
 from polytopes.generators import in_integers
 from polytopes.integers import up
 from polytopes.linear_program import Maxima
@@ -127,18 +128,27 @@ def _proved_reach(values: Floats, constant: Floats, weights: Floats) -> Floats |
 def exact_supports(P: Rows, directions: Floats) -> list[Fraction] | None:
     """Exact supports of a nonempty set along directions in which it is bounded; None if that costs too much."""
     exact = P.exact
-    found = [exact_maximum_of(P, row) if exact is None else support_of(exact, row) for row in directions]
+    found = [_maximum(P, row) if exact is None else support_of(exact, row) for row in directions]
     fractions = [value for value in found if isinstance(value, Fraction)]
     return fractions if len(fractions) == len(directions) else None
 
 
-def exact_maximum_of(P: Rows, direction: Floats) -> Fraction | None:
-    """The exact maximum of a linear form over a nonempty set, by the rational simplex; None if it did not end there."""
+def _maximum(P: Rows, direction: Floats) -> Fraction | None:
+    found = exact_maximum_of(P, direction)
+    return None if found is None else found[0]
+
+
+def exact_maximum_of(P: Rows, direction: Floats) -> tuple[Fraction, Floats] | None:
+    """The exact maximum of a linear form over a nonempty set, by the rational simplex, and where; None if it did not end
+    there.
+    """
     start = P.program.exact_point
     if start is None:
         return None
     outcome = P.program.exact.maximum(direction, start)
-    return Fraction(int(outcome.value.p), int(outcome.value.q)) if outcome.status == "optimal" else None
+    if outcome.status != "optimal":
+        return None
+    return Fraction(int(outcome.value.p), int(outcome.value.q)), to_floats(outcome.point)
 
 
 def exact_support(P: Rows, direction: Floats) -> Fraction | float:

@@ -10,37 +10,15 @@
 #include "powers.h"
 #include "vectors.h"
 
+static const double ROOMY = 0.03125; /* radius, of the size of b, from which the axes are about even */
+static const double SMALLEST = 1e-300; /* scaled numbers below are none */
+static const double NOISE = 1e-15;     /* width, of the coordinates, that may be rounding */
+enum { EVEN_POWERS = 2, ROUNDS = 3 }; /* exponents by which units of axes may differ from even ones; attempts */
+
 EXPORTED integer fdi_prepared_size(integer d, integer m)
 {
     Prepared set;
     return lay_out_prepared(&set, NULL, d, m);
-}
-
-EXPORTED integer fdi_prepared_room(integer d, integer m)
-{
-    return d + 1 + m + d + most(2 * m, most(fdi_scaled_room(m, d), fdi_interior_room(d, m)));
-}
-
-/* Prepares rows (m, d), rhs (m,); 0 if one is zero or out of reach, or if the largest ball is not clear: found, of a
- * radius above so much of the size of b, its centre inside whatever was rounded. times: as fdi_interior.
- */
-EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const double *rhs, double times, double least_ball,
-                              double *prepared, double *block)
-{
-    Prepared set;
-    lay_out_prepared(&set, prepared, d, m);
-    double *found = block, *origin = found + d + 1 + m, *scratch = origin + d;
-    if (fdi_scaled(m, d, rows, rhs, set.at, set.s, scratch) < m) return 0;
-    if (set.rest[m] >= 0 || set.rest[m + 1] >= 0) return 0;
-    fill(origin, 0.0, d);
-    const integer status = fdi_interior(d, m, set.at, set.b, set.norms, origin, times, found, scratch);
-    const Rows all = {d, m, m, set.at, set.b};
-    *set.radius = found[d], *set.size = scale_of(&all), set.reach[0] = NAN;
-    copy(set.centre, found, d);
-    for (integer j = 0; j < d; j++) set.point[j] = times_power(found[j], set.s[j]);
-    copy(set.multipliers, found + d + 1, m);
-    if (status != OPTIMAL || !(found[d] > least_ball * *set.size)) return 0;
-    return fdi_strictly_inside(d, m, set.at, set.b, set.centre, NULL, NULL, scratch);
 }
 
 EXPORTED integer fdi_prepared_facets_room(integer d, integer m) { return 2 * m + irredundant_room(d, m); }
@@ -109,6 +87,102 @@ static integer lay_out_question(Question *question, double *block, integer d, in
     return memory.used;
 }
 
+static void ask_axes(const Question *axes, integer d)
+{
+    fill(axes->forms, 0.0, 2 * d * d);
+    for (integer j = 0; j < d; j++) axes->forms[j * d + j] = 0.5, axes->forms[(d + j) * d + j] = -0.5;
+}
+
+/* Widths (d,) along the axes, seen from a centre, of an infinite one that of the steepest row; 0 if one may be rounding. */
+static int measure_axes(const Prepared *set, integer d, integer m, const double *centre, double radius, double *width,
+                        double *block)
+{
+    Question axes;
+    Memory memory = {block, 0};
+    double *slack = doubles(&memory, m);
+    lay_out_question(&axes, block + memory.used, d, m, 2 * d);
+    ask_axes(&axes, d);
+    fdi_supports(d, m, 2 * d, set->at, set->b, centre, axes.forms, axes.found, axes.codes, NULL, axes.scratch);
+    copy(slack, set->b, m);
+    for (integer j = 0; j < d; j++)
+        for (integer i = 0; i < m; i++) slack[i] -= set->at[j * m + i] * centre[j];
+    const integer *status = axes.codes + 2 * d * d;
+    for (integer j = 0; j < d; j++) {
+        const double high = axes.found[j * d + j], low = axes.found[(d + j) * d + j];
+        double steepest = 0.0;
+        for (integer i = 0; i < m; i++) steepest = larger(steepest, fabs(set->at[j * m + i]) / larger(slack[i], radius));
+        width[j] = status[j] == OPTIMAL && status[d + j] == OPTIMAL ? high - low : 1.0 / steepest;
+        if (!(width[j] > NOISE * larger(fabs(high), fabs(low)) && width[j] < INFINITY)) return 0;
+    }
+    return 1;
+}
+
+/* Puts the axes into units in which a set is about as wide along each: entries alone do not tell small ones that matter
+ * from those that do not. 0 if they are so, or numbers would be lost.
+ */
+static int even_out(Prepared *set, integer d, integer m, const double *centre, double radius, double *block)
+{
+    Memory memory = {block, 0};
+    double *width = doubles(&memory, d);
+    integer low = 10000, high = -10000;
+    if (!measure_axes(set, d, m, centre, radius, width, block + memory.used)) return 0;
+    for (integer j = 0; j < d; j++) low = least(low, exponent_of(width[j])), high = most(high, exponent_of(width[j]));
+    if (high - low <= EVEN_POWERS) return 0;
+    for (integer j = 0; j < d; j++)
+        for (integer i = 0; i < m; i++) {
+            const double value = set->at[j * m + i];
+            if (value != 0.0 && fabs(times_power(value, exponent_of(width[j]))) < SMALLEST) return 0;
+        }
+    for (integer i = 0; i < m; i++) {
+        double square = 0.0;
+        for (integer j = 0; j < d; j++) {
+            set->at[j * m + i] = times_power(set->at[j * m + i], exponent_of(width[j]));
+            square += set->at[j * m + i] * set->at[j * m + i];
+        }
+        const double norm = sqrt(square);
+        const integer shift = exponent_of(norm);
+        for (integer j = 0; j < d; j++) set->at[j * m + i] = times_power(set->at[j * m + i], -shift);
+        set->norms[i] = times_power(norm, -shift), set->b[i] = times_power(set->b[i], -shift), set->r[i] -= shift;
+    }
+    for (integer j = 0; j < d; j++) set->s[j] += exponent_of(width[j]);
+    return 1;
+}
+
+EXPORTED integer fdi_prepared_room(integer d, integer m)
+{
+    Question axes;
+    const integer even = m + d + lay_out_question(&axes, NULL, d, m, 2 * d);
+    return d + 1 + m + d + most(most(2 * m, even), most(fdi_scaled_room(m, d), fdi_interior_room(d, m)));
+}
+
+/* Prepares rows (m, d), rhs (m,); 0 if one is zero or out of reach, or if the largest ball is not clear: found, of a
+ * radius above so much of the size of b, its centre inside whatever was rounded. times: as fdi_interior.
+ */
+EXPORTED integer fdi_prepared(integer d, integer m, const double *rows, const double *rhs, double times, double least_ball,
+                              double *prepared, double *block)
+{
+    Prepared set;
+    lay_out_prepared(&set, prepared, d, m);
+    double *found = block, *origin = found + d + 1 + m, *scratch = origin + d;
+    if (fdi_scaled(m, d, rows, rhs, set.at, set.s, scratch) < m) return 0;
+    if (set.rest[m] >= 0 || set.rest[m + 1] >= 0) return 0;
+    const Rows all = {d, m, m, set.at, set.b};
+    integer status = OPTIMAL;
+    for (integer round = 0; round <= ROUNDS; round++) {
+        fill(origin, 0.0, d);
+        status = fdi_interior(d, m, set.at, set.b, set.norms, origin, times, found, scratch);
+        *set.size = scale_of(&all);
+        if (status != OPTIMAL || !(found[d] > 0.0) || found[d] > ROOMY * *set.size) break;
+        if (round == ROUNDS || !even_out(&set, d, m, found, found[d], scratch)) break;
+    }
+    *set.radius = found[d], set.reach[0] = NAN;
+    copy(set.centre, found, d);
+    for (integer j = 0; j < d; j++) set.point[j] = times_power(found[j], set.s[j]);
+    copy(set.multipliers, found + d + 1, m);
+    if (status != OPTIMAL || !(found[d] > least_ball * *set.size)) return 0;
+    return fdi_strictly_inside(d, m, set.at, set.b, set.centre, NULL, NULL, scratch);
+}
+
 EXPORTED integer fdi_prepared_supports_room(integer d, integer m, integer k)
 {
     Question own, axes;
@@ -126,8 +200,7 @@ static int find_reach(Prepared *set, integer d, integer m, double *block)
 {
     Question axes;
     lay_out_question(&axes, block, d, m, 2 * d);
-    fill(axes.forms, 0.0, 2 * d * d);
-    for (integer j = 0; j < d; j++) axes.forms[j * d + j] = 0.5, axes.forms[(d + j) * d + j] = -0.5;
+    ask_axes(&axes, d);
     solve(set, d, m, 2 * d, &axes, NULL);
     const double *beside = axes.found + 4 * d * d, *bounds = beside + 2 * d * d;
     double farthest = 0.0, steepest = 0.0;
