@@ -1,4 +1,4 @@
-"""The ellipse of largest area inside and the one of least area around: John's theorem says they are alike within d."""
+"""The ellipse of largest area inside and the one of least area around a set."""
 
 import numpy as np
 from matplotlib.pyplot import subplots
@@ -10,7 +10,8 @@ angles = np.linspace(0.0, 2.0 * np.pi, 200)
 circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
 figure, ax = subplots(figsize=(5, 4))
 P.plot(ax, facecolor="#8FB3DC")
-ax.plot(*P.inscribed_ellipsoid().surface(circle).T, color="#2A5A94")
-ax.plot(*P.enclosing_ellipsoid().surface(circle).T, color="#C8553D")
-ax.plot(*P.centroid(), "k+")
+ax.plot(*P.inscribed_ellipsoid().surface(circle).T, color="#2A5A94", label="largest inside")
+ax.plot(*P.enclosing_ellipsoid().surface(circle).T, color="#C8553D", label="least around")
+ax.plot(*P.centroid(), "k+", label="centroid")
 ax.set(aspect="equal")
+ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8)

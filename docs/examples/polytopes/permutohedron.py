@@ -12,4 +12,4 @@ axes = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
 figure = new_figure(figsize=(4.5, 4.5))
 ax = figure.add_subplot(projection="3d")
 (axes @ orders).plot(ax, dims=(0, 1, 2), facecolor="#D9A441", alpha=0.9)
-ax.set(box_aspect=(1, 1, 1), title=f"dimension {orders.affine_dim()}, {orders.incidence().f_vector()} faces")
+ax.set(box_aspect=(1, 1, 1), title="{} vertices, {} edges, {} faces".format(*orders.incidence().f_vector()))
