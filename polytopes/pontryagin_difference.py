@@ -76,7 +76,8 @@ def _by_floats(P: Rows, Q: Rows) -> Table | None:
     supports = Q.prepared.lower_supports(P.A)
     if supports is None or not np.isfinite(supports).all():
         return None
-    sides = np.nextafter(P.b - supports, np.inf)
+    with np.errstate(over="ignore"):  # the least float is above what is below all
+        sides = np.nextafter(P.b - supports, np.inf)
     left = Rows(P.A, sides).prepared
     if left is None or left.radius <= _ROUNDED * np.abs(np.ldexp(P.b, left.row_powers)).max():
         return None

@@ -72,8 +72,9 @@ class Questions(Rows):
         Returns
         -------
         float or array (k,)
-            +inf where unbounded, -inf if the set is empty.  Never below the exact value, and above it by rounding only
-            (some 1e-13 of the size of the set); equal to it where nothing is rounded: integers and short fractions.
+            +inf where unbounded, -inf if the set is empty.  Never below the exact value, and above it by rounding only:
+            some 1e-15 of the size of the set, up to 1e-11 where rows nearly repeat; equal to it where nothing is
+            rounded, as of boxes (``exact=True``: always).
 
         Raises
         ------

@@ -11,7 +11,7 @@ from polytopes import HPolytope
 from svo.analysis.invariant_sets import is_invariant, largest_invariant_set
 from svo.analysis.one_step_sets import LinearSystem, predecessor
 
-FEW = pytest.mark.parametrize("count", [6, pytest.param(150, marks=pytest.mark.slow)])
+FEW = pytest.mark.parametrize("count", [6, pytest.param(60, marks=pytest.mark.slow)])
 
 
 def cube(n: int, half: float) -> HPolytope:
