@@ -139,9 +139,7 @@ def _maximum(P: Rows, direction: Floats) -> Fraction | None:
 
 
 def exact_maximum_of(P: Rows, direction: Floats) -> tuple[Fraction, Floats] | None:
-    """The exact maximum of a linear form over a nonempty set, by the rational simplex, and where; None if it did not end
-    there.
-    """
+    """The exact maximum of a linear form over a nonempty set, and where; None if the rational simplex does not end."""
     start = P.program.exact_point
     if start is None:
         return None
