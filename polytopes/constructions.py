@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Self
 
 import numpy as np
@@ -16,6 +17,7 @@ from polytopes.approximation import Bracketed, Copy
 from polytopes.checks import different_coordinates, real_array, real_number, whole_number
 from polytopes.enclosing_zonotope import enclosing_zonotope, principal_axes
 from polytopes.errors import EmptySetError, UnboundedError
+from polytopes.fractions_given import exact_vector, hold_fractions
 from polytopes.generators import rows_of_generators
 from polytopes.inner_template import inner_template
 from polytopes.intersection import rows_of_both
@@ -79,16 +81,20 @@ class Constructions(Shape):
 
     def translate(self, t: ArrayLike) -> Self:
         """``{x + t : x in P}``, t (n,): exact, right-hand sides that are no floats rounded up."""
+        if hold_fractions(t):
+            return type(self)(*motion.translation(self, exact_vector("t", t, self.dim)))
         shift = real_array("t", t, (self.dim,))
         return moved(self, type(self)(*motion.translation(self, shift)), np.eye(self.dim), shift)
 
-    def scale(self, s: float) -> Self:
+    def scale(self, s: float | Fraction) -> Self:
         """``{s x : x in P}`` for any number s, exact or rounded up as `translate`; 0 gives the origin, or nothing."""
+        if isinstance(s, Fraction):
+            return type(self)(*motion.scaled(self, s))
         factor = real_number("s", s)
         made = type(self)(*motion.scaled(self, factor))
         return moved(self, made, factor * np.eye(self.dim), np.zeros(self.dim))
 
-    def slice(self, fixed: Mapping[int, float]) -> Self:
+    def slice(self, fixed: Mapping[int, float | Fraction]) -> Self:
         """``{x_rest : x in P, x_j = v_j}``: the set where some coordinates are fixed, in the other coordinates.
 
         Exact; right-hand sides that are no floats are rounded up, and an equality then becomes two rows.
@@ -103,7 +109,8 @@ class Constructions(Shape):
         coordinates = different_coordinates("fixed", list(fixed), self.dim) if fixed else []
         if len(coordinates) == self.dim:
             raise ValueError(f"fixed has all {self.dim} coordinates; expected one or more to stay free. Use `x in P`.")
-        values = {j: real_number(f"fixed[{j}]", fixed[j]) for j in coordinates}
+        given = {j: fixed[j] for j in coordinates}
+        values = {j: v if isinstance(v, Fraction) else real_number(f"fixed[{j}]", v) for j, v in given.items()}
         return type(self)(*slicing.slice_at(self, values))
 
     def lift(self, n: int, coordinates: Sequence[int] | None = None) -> Self:

@@ -17,8 +17,10 @@ from polytopes.rows import Table
 _LARGEST = 2**1023
 
 
-def exact_forms(rows: Floats, x: Floats) -> list[Fraction]:
-    """``rows x`` (m,) exactly, of rows (m, n) and a vector (n,)."""
+def exact_forms(rows: Floats, x: Floats | Sequence[Fraction]) -> list[Fraction]:
+    """``rows x`` (m,) exactly, of rows (m, n) and a vector (n,) of floats or fractions."""
+    if not isinstance(x, np.ndarray):
+        return [exact_form(row, x) for row in rows]
     values, certain = exact_product(rows, x[:, None])
     return [
         Fraction(value) if sure else exact_form(row, x)
@@ -26,9 +28,9 @@ def exact_forms(rows: Floats, x: Floats) -> list[Fraction]:
     ]
 
 
-def exact_form(row: Floats, x: Floats) -> Fraction:
+def exact_form(row: Floats, x: Floats | Sequence[Fraction]) -> Fraction:
     """``row'x`` exactly."""
-    pairs = zip(row.tolist(), x.tolist(), strict=True)
+    pairs = zip(row.tolist(), x.tolist() if isinstance(x, np.ndarray) else x, strict=True)
     return sum((Fraction(u) * Fraction(v) for u, v in pairs if u and v), Fraction(0))
 
 

@@ -81,6 +81,22 @@ def rows_of_floats(names: str, A: Any, b: Any) -> tuple[Floats, Floats]:
     return found[:, :-1], found[:, -1]
 
 
+def exact_vector(name: str, value: Any, n: int) -> list[Fraction]:
+    """n numbers as fractions; TypeError or ValueError otherwise."""
+    numbers = exact_numbers(name, value)
+    if len(numbers) != n:
+        raise ValueError(f"{name} has shape ({len(numbers)},); expected ({n},).")
+    return numbers
+
+
+def box_of_fractions(lower: Any, upper: Any) -> tuple[Floats, Floats]:
+    """Rows A and b of a box whose bounds have fractions among them, exactly; errors as of `rows_of_floats`."""
+    low = exact_numbers("lower", lower)
+    high = exact_vector("upper", upper, len(low))
+    axes = np.eye(len(low))
+    return rows_of_floats("Ab", [*axes, *(0.0 - axes)], [*high, *(-v for v in low)])
+
+
 def row_of_floats(what: str, row: Sequence[Fraction]) -> Floats:
     """A row times a positive number that makes floats of it; ValueError if there is none."""
     whole = primitive_row(row)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from polytopes import exchange, plotting
 from polytopes.checks import different_coordinates, real_array, whole_number
 from polytopes.constructions import Constructions
-from polytopes.fractions_given import hold_fractions
+from polytopes.fractions_given import box_of_fractions, hold_fractions
 from polytopes.generators import hull_and_vertices, rows_of_fractions
 from polytopes.kept_vertices import keeping, of_box, of_points
 from polytopes.operators import Operators
@@ -63,8 +63,10 @@ class HPolytope(Shown, Operators):
         Parameters
         ----------
         lower, upper : array_like (n,)
-            A lower bound above its upper bound gives the empty set.
+            A lower bound above its upper bound gives the empty set.  Fractions are taken exactly.
         """
+        if hold_fractions(lower, upper):
+            return cls(*box_of_fractions(lower, upper))
         low = real_array("lower", lower, ("n",), finite=False)
         high = real_array("upper", upper, low.shape, meaning="the shape of lower", finite=False)
         if np.isposinf(low).any() or np.isneginf(high).any():

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from polytopes.checks import real_array, whole_number
 from polytopes.constructions import Constructions
-from polytopes.fractions_given import exact_numbers, hold_fractions
+from polytopes.fractions_given import exact_vector, hold_fractions
 from polytopes.inclusion import broken_row, has_exact_point, has_point
 from polytopes.kept_vertices import moved
 from polytopes.rows import Rows, same_space
@@ -35,6 +35,8 @@ class Operators(Constructions):
     def __sub__(self, other: Rows | ArrayLike) -> Self:
         if isinstance(other, Rows):
             return self.pontryagin_difference(other)
+        if hold_fractions(other):
+            return self.translate([-v for v in exact_vector("t", other, self.dim)])
         return self.translate(-real_array("t", other, (self.dim,)))
 
     def __rmatmul__(self, M: ArrayLike) -> Self:
@@ -62,10 +64,7 @@ class Operators(Constructions):
             raise TypeError("x is a set; expected a point (n,). Q <= P says whether a set lies in P.")
         if not hold_fractions(x):
             return has_point(self, real_array("x", x, (self.dim,)))
-        point = exact_numbers("x", x)
-        if len(point) != self.dim:
-            raise ValueError(f"x has shape ({len(point)},); expected ({self.dim},).")
-        return has_exact_point(self, point)
+        return has_exact_point(self, exact_vector("x", x, self.dim))
 
     def __le__(self, Q: Rows) -> bool:
         return broken_row(same_space(self, Q), self) is None if isinstance(Q, Rows) else NotImplemented

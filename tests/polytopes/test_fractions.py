@@ -60,6 +60,25 @@ def test_hulls_of_short_points_are_exact_in_any_unit(unit: int) -> None:
         assert Q.volume(exact=True) == P.volume(exact=True) * F(2) ** (n * unit)
 
 
+def test_sets_move_by_fractions_exactly() -> None:
+    third = F(1, 3)
+    P, start = HPolytope.box([third, 0], [F(5, 7), 1]), HPolytope.box([0, 0], [F(8, 21), 1])
+    assert P.vertices(exact=True) == [(third, 0), (third, 1), (F(5, 7), 0), (F(5, 7), 1)]
+    assert P == start.translate([third, 0]) == start - [-third, 0]
+    assert third * HPolytope.simplex(2) == HPolytope([[-1, 0], [0, -1], [3, 3]], [0, 0, 1])
+    assert F(0) * P == HPolytope.box([0, 0], [0, 0])
+    assert -third * P == P.scale(F(-1, 3)) == HPolytope.box([F(-5, 21), -third], [F(-1, 9), 0])
+    assert HPolytope.simplex(2).slice({0: third}) == HPolytope.box([0], [F(2, 3)])
+    assert HPolytope(np.empty((0, 2)), [], [[1, 1]], [1]).slice({0: third}) == HPolytope.box([F(2, 3)], [F(2, 3)])
+    for wrong, words in (
+        (lambda: P.translate([third]), r"t has shape \(1,\); expected \(2,\)"),
+        (lambda: HPolytope.box([third], [1, 2]), r"upper has shape \(2,\); expected \(1,\)"),
+        (lambda: HPolytope.box([third], [np.inf]), "upper holds inf"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            wrong()
+
+
 def test_what_is_no_rational_is_said_once() -> None:
     third = F(1, 3)
     for wrong, words in (

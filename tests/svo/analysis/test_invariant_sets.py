@@ -1,5 +1,6 @@
 """One-step sets and invariant sets: closed forms, proofs in rationals, and long runs that stay inside."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,9 @@ def test_predecessor_and_successor_in_one_dimension() -> None:
     assert successor(HPolytope.empty(1), system).is_empty()
     still = LinearSystem([[0.0]], a=[0.5])
     assert predecessor(interval(1.0), still) == HPolytope.whole_space(1)
+    drifting = LinearSystem([[1.0]], a=[0.5])
+    assert predecessor(interval(1.0), drifting) == HPolytope.box([-1.5], [0.5])
+    assert successor(interval(1.0), drifting) == HPolytope.box([-0.5], [1.5])
     assert successor(HPolytope.whole_space(1), still) == HPolytope.box([0.5], [0.5])
 
 
@@ -71,6 +75,29 @@ def test_the_largest_set_of_a_contraction(n: int) -> None:
         assert found.verify()
         assert (found.set == cube(n, 1.0)) == (status == "invariant")
     assert found.certificate is not None
+
+
+def test_an_empty_answer_is_proved_of_its_own_set() -> None:
+    found = largest_invariant_set(cube(1, 1.0), LinearSystem(np.eye(1) / 2, disturbances=interval(0.50001)))
+    assert found.verify()
+    assert not replace(found, set=cube(1, 1.0)).verify()
+    assert not replace(found, certificate=None).verify()
+
+
+def test_the_box_that_is_added_counts_in_the_proof() -> None:
+    system = LinearSystem([[0.5]], disturbances=interval(0.25))
+    assert is_invariant(interval(0.5), system)
+    assert is_invariant(interval(1.0), system, np.array([0.25]))
+    assert not is_invariant(interval(1.0), system, np.array([0.25 + 2.0**-52]))
+    assert not is_invariant(interval(0.5), system, np.array([0.25]))
+
+
+def test_a_row_that_others_nearly_imply_is_kept() -> None:
+    turn = [[0.72, -0.54], [0.54, 0.72]]
+    constraint = cube(2, 1.0) & HPolytope([[1.0, 0.0], [0.0, 1.0]], [1.0 - 1e-13, 1.0 - 3e-13])
+    found = largest_invariant_set(constraint, LinearSystem(turn, disturbances=cube(2, 0.03)))
+    assert found.status == "invariant"
+    assert found.set <= constraint
 
 
 def test_the_largest_set_of_a_rotation_that_shrinks() -> None:
