@@ -79,7 +79,7 @@ class Constructions(Shape):
         """
         return type(self)(*polar(self))
 
-    def translate(self, t: ArrayLike) -> Self:
+    def translate(self, t: ArrayLike | Sequence[Fraction]) -> Self:
         """``{x + t : x in P}``, t (n,): exact, right-hand sides that are no floats rounded up."""
         if hold_fractions(t):
             return type(self)(*motion.translation(self, exact_vector("t", t, self.dim)))

@@ -60,8 +60,9 @@ def contains_set(P: Rows, Q: Rows, tol: float) -> Containment:
     sizes = lengths(normals)
     values = _supports(Q, normals)
     beyond = values - sides
-    for i in np.flatnonzero(~(beyond <= tol * sizes) & (beyond <= _DOUBTFUL * (np.abs(values) + np.abs(sides)))):
-        beyond[i] = _settled(Q, normals[i], values[i]) - sides[i]
+    doubtful = ~(beyond <= tol * sizes) & (beyond <= _DOUBTFUL * (np.abs(values) + np.abs(sides)))
+    for k in np.flatnonzero(doubtful).tolist():
+        beyond[k] = _settled(Q, normals[k], values[k]) - sides[k]
     broken = ~(beyond <= tol * sizes)
     if not broken.any():
         return Containment(True)
