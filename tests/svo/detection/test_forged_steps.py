@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 from proof_cases import claims, proven, steps_of, tiny, with_steps
-from test_proof_files import FACTORS, NOTHING, S_WITHIN, alarm_of, by_hand, s_within
+from proof_edits import NOTHING
+from test_terms_of_proofs import FACTORS, S_WITHIN, alarm_of, by_hand, s_within
 
 Steps = list[dict[str, Any]]
 
