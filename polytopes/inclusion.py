@@ -100,7 +100,7 @@ def _bounded_by(Q: Rows, normal: Floats, multipliers: Floats, side: float) -> bo
 
 def _exceeds(Q: Rows, normal: Floats, side: float, status: str) -> bool:
     """Whether some point of Q has ``a'x > b``."""
-    if status == UNBOUNDED and not Q.program.thin:
+    if status == UNBOUNDED and Q.program.tells_rays:
         return True
     if Q.wide and lower_supports(Q, normal[None])[0] > side:
         return True

@@ -32,6 +32,7 @@ _EPS = float(np.finfo(np.float64).eps)
 WIDEST = 4.0  # of the size of b: by duality no radius is beyond max |b_i| / |a_i|, and no norm is below 1/2
 CLEAN = 1e-9  # relative gap between a maximum and its bound that is still accepted from floats
 SHARP = 1e-6  # the same gap, of the radius of a largest ball
+_LOST = 1e-6  # of the largest entry of balanced rows: floats do not vouch for a ray beside smaller ones
 _THIN = 1e-9  # radius, relative to the size of b, below which floats do not vouch for a point
 SMALL_BALL = 1e-4  # radius, relative to the size of b, below which the widths of a set may differ much
 _NOTHING = -(2**20)  # exponent of zero
@@ -182,6 +183,12 @@ class Program:
         return self.AT.shape[0] == 0 or not interior.reliable or interior.radius <= _THIN * self.size
 
     @derived
+    def tells_rays(self) -> bool:
+        """Whether floats tell a ray from a long edge: not of a thin set, nor where entries are lost beside others."""
+        sizes = np.abs(self.balanced.AT[self.balanced.AT != 0.0])
+        return not self.thin and sizes.min(initial=1.0) >= _LOST * sizes.max(initial=1.0)
+
+    @derived
     def fat(self) -> bool:
         """Whether a ball fits in, within the affine set, that floats vouch for."""
         return self.consistent and not self.thin and self.interior.radius > 0.0
@@ -275,7 +282,7 @@ class Program:
         multipliers[:, self.kept] = np.minimum(weights, np.finfo(np.float64).max)
         inside = program._keeps(found.points)
         for q, name in enumerate(found.status):
-            if name == UNBOUNDED and whole[q] and not self.thin:  # of a thin set, floats take an edge for a ray
+            if name == UNBOUNDED and whole[q] and self.tells_rays:
                 values[q] = np.inf
             elif name != OPTIMAL or not inside[q] or not whole[q]:
                 guess = lifted[q], multipliers[q]

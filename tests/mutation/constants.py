@@ -192,6 +192,7 @@ CONSTANTS = (
     Constant("polytopes.linear_program", "CLEAN", "heuristic"),
     Constant("polytopes.containment", "_DOUBTFUL", "heuristic"),
     Constant("polytopes.linear_program", "_THIN", "heuristic"),
+    Constant("polytopes.linear_program", "_LOST", "heuristic"),
     Constant("polytopes.linear_program", "SMALL_BALL", "heuristic"),
     Constant("polytopes.linear_program", "_NOISE", "heuristic"),
     Constant("polytopes.linear_program", "SHARP", "heuristic"),

@@ -129,3 +129,16 @@ def test_an_image_that_is_a_point_but_for_rounding(seed: int) -> None:
     M, t = np.ldexp(rng.normal(size=(n, n)), -58), rng.uniform(1.0, 2.0, n)
     scale = 2**140  # all bits of the floats below
     assert_outer(P.affine_map(M, t), mapped(polyhedron(P), whole(M, scale), whole(t, scale), scale), f"in {n}")
+
+
+def test_an_entry_that_is_lost_beside_others_makes_no_ray() -> None:
+    """A row of 2.5e-32 and 1 is all but an axis: floats of balanced rows took the edge along it for a ray."""
+    P = HPolytope.from_vertices([[-0.6, 0.0], [-0.6, 0.3], [1e-16, 0.0]])
+    assert P.is_bounded()
+    assert len(P.vertices()) == 3
+    for k in range(200):
+        rng = np.random.default_rng([37, k])
+        A = np.round(rng.normal(size=(4, 2)), 1)
+        A = np.where(rng.random((4, 2)) < 0.3, 10.0 ** -rng.integers(8, 34, (4, 2)) * rng.choice([-1, 1], (4, 2)), A)
+        P = HPolytope(A, 10.0 ** -rng.integers(0, 16, 4) * rng.random(4))
+        assert P.is_bounded() == polyhedron(P).is_bounded(), k
