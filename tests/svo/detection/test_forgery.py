@@ -76,7 +76,7 @@ def test_bounds_are_kept_to_the_last_bit() -> None:
 def test_a_checker_that_takes_any_multipliers_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     """The whole of forging and judging, with a fault in what is judged: alarms at healthy samples are false."""
     judge = Checked(only_one=True)
-    monkeypatch.setattr(judge._check.Chain, "_total", lambda *_: judge._check.num(1e300))
+    monkeypatch.setattr(judge._check.Chain, "_total", lambda *_, **_named: judge._check.num(1e300))
     holes = judged(judge, range(60), 1)["holes"]
     assert any("explains samples up to" in what for _, _, what in holes)
 

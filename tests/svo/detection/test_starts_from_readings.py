@@ -119,7 +119,7 @@ def test_no_chain_begins_before_its_model_is_claimed_to_hold(since: int, begun: 
     first = ArrivalSet.box(np.zeros(1), np.ones(1))
     of = ModelOnLog(model, first, model.simulate([0.5], np.zeros((301, 0)), rng))
     own = None if begun is None else Start("assumed", begun, first)
-    found = [(start.kind, start.sample) for start in ChainProver(of, since, own)._starts(300)]
+    found = [(start.kind, start.sample) for start in ChainProver(of, since, own).starts(300)]
     earliest = since if begun is None else begun
     last = ("readings", since) if begun is None else ("assumed", begun)
     nearer = [("readings", 300 - before) for before in (4, 8, 16, 32, 64, 128, 256) if 300 - before > earliest]

@@ -64,11 +64,11 @@ def programs(case: Case, log: Log) -> float:
     """Of a sample, after the first ones."""
     watcher, counts = observer(case), []
     for _ in drive(watcher, log):
-        counts.append(int(watcher.current_window.memory.arrays["clock"][PROGRAMS]))
+        counts.append(int(watcher._window.memory.arrays["clock"][PROGRAMS]))
     return (counts[-1] - counts[SETTLED]) / (len(counts) - 1 - SETTLED)
 
 
-@pytest.mark.parametrize(("name", "least", "most"), [("eclipse", 1.0, 5.0), ("tank", 1.0, 5.0), ("lorenz", 9.0, 9.0)])
+@pytest.mark.parametrize(("name", "least", "most"), [("eclipse", 1.0, 5.0), ("tank", 1.0, 5.0), ("lorenz", 8.5, 9.5)])
 def test_programs_are_solved_where_they_count(name: str, least: float, most: float) -> None:
     """Two to four a sample for the arrival set, and those of all ends of the box where a transition is not sharp."""
     assert least <= programs(*run_of(name)) <= most
