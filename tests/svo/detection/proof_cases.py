@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from checkers import CHECK, FOLDER
 
 from polytopes import HPolytope
 from svo import ArchitectureI, ScheduleTable, UncertainModel, Uncertainty, WindowObserver, verify
@@ -21,6 +20,7 @@ from svo.isolation.alarms import write_alarms
 from svo.logs.csv import write_csv
 from svo.logs.log import Log
 from svo.logs.names import Column, Columns
+from tests.svo.detection.checkers import CHECK, FOLDER
 
 Files = tuple[Path, Path, Path]  # proof, plant and log
 

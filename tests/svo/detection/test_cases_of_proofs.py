@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from checkers import CHECK
 from hull_plants import of_both_signs, turning
 from proof_cases import Files, answer, claims, proven, steps_of, with_steps
 from test_checker_on_trajectories import SAMPLES, Trajectory, array, exact
@@ -20,6 +19,7 @@ from svo.observers.polytope.box_program import BoxProgram
 from svo.observers.window.chain import prover_of
 from svo.observers.window.chain_starts import own_start
 from svo.observers.window.prover import ChainProver
+from tests.svo.detection.checkers import CHECK
 
 # -- any multipliers, on runs in rationals ------------------------------------------------------------------------
 

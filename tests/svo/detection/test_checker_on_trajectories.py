@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from checkers import CHECK
+
+from tests.svo.detection.checkers import CHECK
 
 SAMPLES = 4
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checkers import CHECK
 from proof_cases import proven, steps_of, tiny
 
 from benchmarks._claims import of_plant, of_window, one_reading, set_of
@@ -18,6 +17,7 @@ from polytopes import HPolytope
 from svo import UncertainModel, WindowObserver
 from svo.detection.plant_record import plant_record
 from svo.isolation.alarms import read_alarms, verify_alarms
+from tests.svo.detection.checkers import CHECK
 
 DATA = Path(__file__).parents[1] / "isolation" / "data"
 

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from checkers import CHECK, NONLINEAR
 from proof_cases import Files, Made, proven, random_plant, steps_of, tiny, with_steps
 
 from svo import UncertainModel
 from svo.detection.plant_record import observer_record, plant_record
 from svo.observers.window.evidence import ArrivalSet
 from svo.store.values import encode_value
+from tests.svo.detection.checkers import CHECK, NONLINEAR
 from tests.svo.models.nonlinear_plants import CASES
 
 Record = dict[str, Any]

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from checkers import CHECK, NONLINEAR
 from proof_cases import Files, Made, answer, claims, proven, steps_of, with_steps
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
@@ -29,6 +28,7 @@ from svo.observers.window.memory import Memory
 from svo.observers.window.prover import ProvenChain
 from svo.observers.window.window import Window
 from svo.store.values import encode_value
+from tests.svo.detection.checkers import CHECK, NONLINEAR
 from tests.svo.models.nonlinear_plants import CASES, Case
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"

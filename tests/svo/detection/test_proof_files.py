@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checkers import CHECK, FOLDER
 from proof_cases import Files, answer, proven, random_plant, steps_of
 from proof_edits import of_kind
 from typer.testing import CliRunner
@@ -22,6 +21,7 @@ from typer.testing import CliRunner
 from svo import detect, find_plant, read_log, verify
 from svo.cli import app
 from svo.store.packed_lines import members_of
+from tests.svo.detection.checkers import CHECK, FOLDER
 from tests.svo.observers.long_chains import long_chains
 
 CART = Path(__file__).parents[3] / "docs" / "examples" / "cart.toml"
