@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,8 @@ from svo.checks import expect_kind
 from svo.detection.chains import PlantModels, with_chains
 from svo.detection.found import Detection
 from svo.detection.proof_file import ProofFile
-from svo.isolation import NOT_CHECKED, Alarm, AlarmCheck, check_alarm, read_alarms, verify_alarms
+from svo.isolation import NOT_CHECKED, Alarm, AlarmCheck, check_alarm, verify_alarms
+from svo.isolation.alarms import numbered_alarms
 from svo.logs.log import Log
 from svo.observers.window.certificate import BOUNDS_OF_S
 from svo.plant import MonitoredPlant
@@ -171,15 +172,16 @@ def _verified_file(
 ) -> Verification:
     if log is None and whole is not None:
         raise ValueError("full is True and there is no log; give the log that the alarms are of")
-    alarms = [] if log is None else _of_one_run(path)
-    if log is None or not alarms:
+    numbered = [] if log is None else _of_one_run(path)
+    if log is None or not numbered:
         return Verification(str(path), tuple(verify_alarms(path)), f"{_START}, and {_MODEL}")
     # A description lies beside the alarms, where `Detection.save` put it.
+    alarms = [alarm for _, alarm in numbered]
     found = plant or find_plant(str(alarms[0].source.get("plant")), path.parent)
     data = log if isinstance(log, Log) else read_log(log, found)
     models = PlantModels(found, data)
-    checks = _completed(verify_alarms(path, data, models.difference), alarms, models, whole)
-    return Verification(str(path), checks, "" if whole is not None else _START)
+    checks = [replace(check_alarm(alarm, data, models.difference), line=number) for number, alarm in numbered]
+    return Verification(str(path), _completed(checks, alarms, models, whole), "" if whole is not None else _START)
 
 
 def _completed(
@@ -197,10 +199,10 @@ def _completed(
     return tuple(found)
 
 
-def _of_one_run(path: Path) -> list[Alarm]:
-    """The alarms of a file, which a log can be given for."""
-    alarms = read_alarms(path)
-    runs = [{key: value for key, value in alarm.source.items() if key != "model"} for alarm in alarms]
+def _of_one_run(path: Path) -> list[tuple[int, Alarm]]:
+    """The alarms of a file with their lines, which a log can be given for."""
+    alarms = numbered_alarms(path)
+    runs = [{key: value for key, value in alarm.source.items() if key != "model"} for _, alarm in alarms]
     if any(run != runs[0] for run in runs):
         raise ValueError(
             f"{path} has alarms of several runs, and a log is that of one; give the alarms of that run alone"

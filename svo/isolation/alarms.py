@@ -80,10 +80,15 @@ def read_alarms(path: str | Path) -> list[Alarm]:
     ValueError
         Naming the first line that is no intact alarm record, or if the file is none of alarms.
     """
+    return [alarm for _, alarm in numbered_alarms(path)]
+
+
+def numbered_alarms(path: str | Path) -> list[tuple[int, Alarm]]:
+    """The same, each with the number of its line."""
     alarms, wrong = [], ""
     for number, text in _lines(path):  # to the end, where it may turn out to be another kind of file
         try:
-            alarms.append(read_record(text))
+            alarms.append((number, read_record(text)))
         except BadRecord as error:
             wrong = wrong or f"{path}, line {number}: {error}"
     if wrong:
