@@ -70,6 +70,7 @@ EXPORTED integer fdi_prepared_ball(integer d, integer m, const double *rows, dou
 }
 
 static const double TIGHT = 1e-14; /* gap, of the terms, that rounding leaves */
+static const double LOST = 1e-6;   /* of the largest entry: beside smaller ones floats do not vouch for a ray */
 
 typedef struct {
     double *forms, *found, *gaps;
@@ -345,11 +346,24 @@ static double lower_bound(const Prepared *set, integer d, integer m, const doubl
     return value - back * larger(value - inside, 0.0) - 3.0 * unit * sizes;
 }
 
+/* Whether floats tell a ray of a prepared set from a long edge: not where entries are lost beside others. */
+static int tells_rays(const Prepared *set, integer d, integer m)
+{
+    double least = INFINITY, most = 0.0;
+    for (integer k = 0; k < d * m; k++) {
+        const double size = fabs(set->at[k]);
+        most = larger(most, size);
+        if (size > 0.0) least = smaller(least, size);
+    }
+    return least >= LOST * most;
+}
+
 /* Upper bounds (k,) of the supports of a prepared set along directions (k, d), infinite where it is unbounded.
  *
  * 0 if a bound is neither within `clean` of the sizes of its terms nor within `sharp` of the radius (and rounding) of the
- * value that was found, or a form was not solved. Points (k, d) and multipliers of the rows (k, m), zero before, are left
- * if there is room for them (else NULL), and lower bounds (k,). They mean something only where values are finite.
+ * value that was found, a ray is not told from a long edge, or a form was not solved. Points (k, d) and multipliers of
+ * the rows (k, m), zero before, are left if there is room for them (else NULL), and lower bounds (k,). They mean
+ * something only where values are finite.
  */
 EXPORTED integer fdi_prepared_supports(integer d, integer m, integer k, double *prepared, const double *directions,
                                        double clean, double sharp, double *values, double *points, double *weights,
@@ -366,7 +380,7 @@ EXPORTED integer fdi_prepared_supports(integer d, integer m, integer k, double *
     for (integer q = 0; q < k; q++) {
         const double gap = question.gaps[k + q], terms = question.gaps[2 * k + q];
         values[q] = INFINITY;
-        if (status[q] == UNBOUNDED) continue;
+        if (status[q] == UNBOUNDED && tells_rays(&set, d, m)) continue;
         const double room = smaller(clean * terms, sharp * larger(*set.radius, 0.0) + 8.0 * EPS * terms);
         if (status[q] != OPTIMAL || !(gap <= room)) return 0;
         values[q] = times_power(question.gaps[q], question.tops[q]);

@@ -116,7 +116,7 @@ CONSTANTS = (
             "polytopes/near_cone.c": ("ON", "BESIDE", "SURE", "INDEPENDENT", "SINGULAR", "MOVED"),
             "polytopes/bounded_sets.c": ("NARROW", "STEEP"),
             "polytopes/volume.c": ("STEPS",),
-            "polytopes/questions.c": ("TIGHT", "ROOMY", "NOISE"),
+            "polytopes/questions.c": ("TIGHT", "LOST", "ROOMY", "NOISE"),
             "polytopes/programs.c": ("CHAINED",),
             "polytopes/scaling.c": ("SWEEPS", "STILL"),
             "polytopes/sums.h": ("UNDERFLOW_BELOW",),

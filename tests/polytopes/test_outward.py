@@ -142,3 +142,5 @@ def test_an_entry_that_is_lost_beside_others_makes_no_ray() -> None:
         A = np.where(rng.random((4, 2)) < 0.3, 10.0 ** -rng.integers(8, 34, (4, 2)) * rng.choice([-1, 1], (4, 2)), A)
         P = HPolytope(A, 10.0 ** -rng.integers(0, 16, 4) * rng.random(4))
         assert P.is_bounded() == polyhedron(P).is_bounded(), k
+        for direction in rng.integers(-9, 10, (3, 2)):
+            assert np.isfinite(P.support(direction)) == (maximum(polyhedron(P), direction) is not None), (k, direction)
