@@ -58,9 +58,18 @@ def pontryagin_difference(P: Rows, Q: Rows) -> Table:
 
 def _by_known_vertices(P: Rows, Q: Rows) -> Table | None:
     """The rows moved inward, rounded up, where the vertices of Q are floats and P has no equalities; else None."""
-    V = None if P.d.size else known_vertices(Q)
+    V = None if P.d.size else _vertices_that_count(P, Q)
     sides = None if V is None else moved_sides(P.in_core, V)
     return None if sides is None else (P.A, sides, P.C, P.d)
+
+
+def _vertices_that_count(P: Rows, Q: Rows) -> Floats | None:
+    """The vertices (k, n) of Q that are known; of a box, if these are more than the rows of P, one that each needs."""
+    box = Q.as_box
+    if box is None or 2.0**Q.dim <= P.b.size or not box.bounded or box.rounded.any():
+        return known_vertices(Q)
+    lower, upper = box.corners
+    return np.where(P.A > 0.0, upper, lower)
 
 
 def moved_sides(rows: InCore, V: Floats) -> Floats | None:

@@ -80,9 +80,9 @@ static void homogenise(Cone *cone, const Prepared *set)
     cone->inner[d] = 1.0;
 }
 
-/* Vertices (room, d) of a prepared set that is bounded, in lexicographic order: their number, or why not. wide, apart: as
- * fractions of the size of b, the radius of a largest ball and the distance of a vertex from a row from which rounding does not matter. volume: of
- * the set, -1 if it has too many simplices; or NULL, if nobody asks.
+/* Vertices (room, d) of a prepared set that is bounded, in lexicographic order: their number, or why not. wide, apart:
+ * as fractions of the size of b, the radius of a largest ball and the distance of a vertex from a row from which
+ * rounding does not matter. volume: of the set, -1 if it has too many simplices; or NULL, if nobody asks.
  */
 EXPORTED integer fdi_prepared_vertices(integer d, integer m, double *prepared, double wide, double apart, integer room,
                                        double *points, double *volume, double *block)

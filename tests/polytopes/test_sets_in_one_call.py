@@ -269,3 +269,16 @@ def test_no_vertex_is_where_rows_that_nearly_depend_on_each_other_meet() -> None
         assert (P.A @ P.vertices().T - P.b[:, None]).max() < 1e-9
         assert P.volume() == pytest.approx(float(P.volume(exact=True)), rel=1e-9)
     assert found > 8
+
+
+def test_a_box_moves_each_row_by_the_corner_that_it_needs() -> None:
+    """Not by all corners, of which a box in R^20 has a million."""
+    rng = np.random.default_rng(20)
+    for n in (3, 8, 20):
+        A, b = rng.integers(-3, 4, (40, n)).astype(float), rng.integers(50, 99, 40).astype(float)
+        lower = rng.integers(-4, 1, n).astype(float)
+        upper = lower + rng.integers(0, 3, n)
+        kept = HPolytope(A, b) - HPolytope.box(lower, upper)
+        assert (kept.b == b - np.maximum(A * lower, A * upper).sum(axis=1)).all()
+        halved = HPolytope(A / 2.0**40, b / 2.0**40) - HPolytope.box(lower, upper)
+        assert (halved.b * 2.0**40 == kept.b).all()
